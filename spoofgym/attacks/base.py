@@ -1,0 +1,60 @@
+"""The base class of every attack."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.streams import RunStreams
+
+
+class Attack(ABC):
+    """What a spoofer adds to the fixes of N runs.
+
+    A subclass computes its `offset`; a random one draws an episode's numbers in `reset`.
+
+    Attributes:
+        onset: scenario time from which the offset grows, s; None = the start of the game (its epoch 0, the last clean one).
+    """
+
+    onset: float | None = None
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The specification that builds this attack."""
+
+    def bind(self, timeline: Timeline, num_runs: int) -> None:
+        """Fit the attack to a game.
+
+        Raises:
+            ValueError: the attack starts before the game or after its end.
+        """
+        onset = timeline.start if self.onset is None else self.onset
+        if not timeline.start <= onset < timeline.end:
+            raise ValueError(
+                f"attack {self.name!r}: onset {onset:g} s lies outside the game, "
+                f"which runs from {timeline.start:g} s to {timeline.end:g} s"
+            )
+        self._onset = onset
+        self._timeline = timeline
+        self._num_runs = num_runs
+
+    def reset(self, runs: Runs, streams: RunStreams) -> None:
+        """Start new episodes; a random attack draws here, a block per run from the stream "opponent"."""
+
+    def elapsed(self, clock: Clock) -> Floats:
+        """Time since the onset, (N,), s; zero before it."""
+        return np.maximum(clock.time - self._onset, 0.0)
+
+    def started(self, clock: Clock) -> NDArray[np.bool_]:
+        """Whether the epoch lies after the onset, (N,); rounding of its time does not count."""
+        return clock.time - self._onset > 1e-6 * self._timeline.interval
+
+    @abstractmethod
+    def offset(self, clock: Clock) -> Floats:
+        """The offset added to the fix of the epoch at ``clock``, (N, 3), m ENU; zero until the onset."""

@@ -1,0 +1,189 @@
+"""Chi-square tests of the innovation: of one epoch, and summed over a window.
+
+Under a matched filter the normalised innovation squared of a fix of dimension m is chi-square with m degrees of freedom, and
+independent from epoch to epoch.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import special
+
+from spoofgym import validation
+from spoofgym.detectors.base import Detector
+from spoofgym.detectors.ring import Ring
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.interface import Epoch
+from spoofgym.specification import spell
+
+DEFAULT_P_FA = 1e-5
+DEFAULT_ARL0 = 1e5
+DEFAULT_WINDOW = 20
+
+SHADMEHRI_THRESHOLD = 25.9
+"""Chi-square quantile for 3 degrees of freedom at 1e-5 as published (Shadmehri and Esfanjani 2025, eq 15)."""
+
+WINDOWED_THRESHOLDS: dict[tuple[int, int, float], float] = {(3, 20, 1e5): 0.0}
+"""Thresholds of the windowed test by (m, n, ARL0), for white innovations. A row is reproduced, with its interval, by
+``python -m spoofgym.calibration --dimension 3 --window 20 --arl0 1e5``.
+"""
+
+
+def quantile(p_fa: float, degrees: int) -> float:
+    """The value that chi-square with ``degrees`` degrees of freedom exceeds with probability ``p_fa``."""
+    return float(2.0 * special.gammainccinv(degrees / 2.0, p_fa))
+
+
+def exceedance(threshold: float, degrees: int) -> float:
+    """The probability that chi-square with ``degrees`` degrees of freedom exceeds the threshold."""
+    return float(special.gammaincc(degrees / 2.0, threshold / 2.0))
+
+
+class Snapshot(Detector):
+    """Chi-square test of each epoch by itself: statistic nis, alarm above the threshold.
+
+    With nothing given the threshold is the published 25.9 for m = 3 (preset ``shadmehri``), and the quantile at 1e-5 for m = 6. The
+    statistics of a matched filter are independent, so ARL0 = 1 / P_FA exactly, and ``arl0`` needs no simulation there.
+
+    Args:
+        threshold: compared with nis, no unit.
+        p_fa: probability of a false alarm per epoch; the threshold is the chi-square quantile.
+        preset: ``shadmehri``, a published threshold.
+        arl0: average run length between false alarms, epochs.
+
+    Raises:
+        ValueError: more than one of these is given, or a value is out of range.
+    """
+
+    PRESETS = ("shadmehri",)
+
+    def __init__(
+        self,
+        threshold: float | None = None,
+        p_fa: float | None = None,
+        preset: str | None = None,
+        arl0: float | None = None,
+    ) -> None:
+        validation.at_most_one("snapshot", threshold=threshold, p_fa=p_fa, preset=preset, arl0=arl0)
+        self.threshold = None if threshold is None else validation.above("snapshot", "threshold", threshold)
+        self.target_arl0 = None if arl0 is None else validation.above("snapshot", "arl0", arl0, 1.0)
+        self._p_fa = None if p_fa is None else validation.probability("snapshot", "p_fa", p_fa)
+        self._preset = None if preset is None else validation.one_of("snapshot", "preset", preset, self.PRESETS)
+        self._name = spell("snapshot", threshold=self.threshold, p_fa=self._p_fa, preset=preset, arl0=self.target_arl0)
+        self._given = self.threshold
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this detector."""
+        return self._name
+
+    def bind(self, num_runs: int, dimension: int) -> None:
+        """Set the threshold for fixes of ``dimension`` m.
+
+        Raises:
+            ValueError: a preset published for another dimension.
+        """
+        if not self.calibrated:
+            self.threshold = self._threshold(dimension)
+            self.arl0 = self.target_arl0 or 1.0 / exceedance(self.threshold, dimension)
+
+    def update(self, epoch: Epoch) -> Floats:
+        """The normalised innovation squared, (N,)."""
+        return epoch.innovation.nis
+
+    def _threshold(self, dimension: int) -> float:
+        if self._given is not None:
+            return self._given
+        if self._p_fa is not None:
+            return quantile(self._p_fa, dimension)
+        if self.target_arl0 is not None:
+            return quantile(1.0 / self.target_arl0, dimension)
+        if self._preset == "shadmehri" and dimension != 3:
+            raise ValueError(f"{self.name}: published for fixes of dimension 3, got {dimension}; give p_fa or arl0")
+        return SHADMEHRI_THRESHOLD if dimension == 3 else quantile(DEFAULT_P_FA, dimension)
+
+
+class Windowed(Detector):
+    """Chi-square test of a sliding window: statistic is the sum of the nis of the last n epochs, m n degrees of freedom.
+
+    ``n`` counts terms. FOI-R-5687's k counts the epochs before the present one: its test (3) sums k + 1 terms and calls their degrees
+    of freedom 3k. Until n epochs have come the sum is over what there is.
+
+    Windows overlap, so ARL0 is not 1 / P_FA: it is calibrated. With nothing given it is 1e5. Thresholds in `WINDOWED_THRESHOLDS` are
+    taken from there; for any other combination ``threshold`` is None until calibration sets it.
+
+    Args:
+        n: terms of the sum, epochs.
+        threshold: compared with the sum, no unit.
+        p_fa: probability that the statistic of one epoch exceeds the threshold; ``arl0`` then stays unknown.
+        preset: ``shadmehri``, the published 25.9 for the mean of the window, so 25.9 n for the sum. It is the quantile of a single
+            epoch: the false-alarm probability of a mean of 5 is 3e-20 instead of 1e-5.
+        arl0: average run length between false alarms, epochs.
+
+    Raises:
+        ValueError: more than one of the last four is given, or a value is out of range.
+    """
+
+    PRESETS = ("shadmehri",)
+
+    def __init__(
+        self,
+        n: int = DEFAULT_WINDOW,
+        threshold: float | None = None,
+        p_fa: float | None = None,
+        preset: str | None = None,
+        arl0: float | None = None,
+    ) -> None:
+        self.n = validation.whole("windowed", "n", n, 1)
+        self.memory = self.n - 1
+        validation.at_most_one("windowed", threshold=threshold, p_fa=p_fa, preset=preset, arl0=arl0)
+        self.threshold = None if threshold is None else validation.above("windowed", "threshold", threshold)
+        self._p_fa = None if p_fa is None else validation.probability("windowed", "p_fa", p_fa)
+        self._preset = None if preset is None else validation.one_of("windowed", "preset", preset, self.PRESETS)
+        if threshold is None and p_fa is None and preset is None:
+            self.target_arl0 = validation.above("windowed", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
+        self._name = spell(
+            "windowed",
+            n=None if self.n == DEFAULT_WINDOW else self.n,
+            threshold=self.threshold,
+            p_fa=self._p_fa,
+            preset=preset,
+            arl0=None if self.target_arl0 == DEFAULT_ARL0 else self.target_arl0,
+        )
+        self._given = self.threshold
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this detector."""
+        return self._name
+
+    def bind(self, num_runs: int, dimension: int) -> None:
+        """Allocate the window, and set the threshold for fixes of ``dimension`` m where it is known.
+
+        Raises:
+            ValueError: a preset published for another dimension.
+        """
+        self._ring = Ring(num_runs, self.n)
+        if not self.calibrated:
+            self.threshold = self._threshold(dimension)
+            self.arl0 = None if self.threshold is None else self.target_arl0
+
+    def reset(self, runs: Runs) -> None:
+        """Empty the windows of these runs."""
+        self._ring.reset(runs)
+
+    def update(self, epoch: Epoch) -> Floats:
+        """The sum over the window, (N,), added up anew at every epoch so that no rounding error accumulates."""
+        self._ring.push(epoch.innovation.nis)
+        return np.add.reduce(self._ring.values, axis=1)
+
+    def _threshold(self, dimension: int) -> float | None:
+        if self._p_fa is not None:
+            return quantile(self._p_fa, dimension * self.n)
+        if self._preset is not None:
+            if dimension != 3:
+                raise ValueError(f"{self.name}: published for fixes of dimension 3, got {dimension}; give p_fa or arl0")
+            return SHADMEHRI_THRESHOLD * self.n
+        if self.target_arl0 is not None:
+            return WINDOWED_THRESHOLDS.get((dimension, self.n, self.target_arl0))
+        return self._given

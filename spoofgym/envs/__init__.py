@@ -1,0 +1,1 @@
+"""The environments: the spoofer's game, single and vectorised."""

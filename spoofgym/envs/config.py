@@ -1,0 +1,72 @@
+"""Arguments of the environments: frozen, typed, and unknown keys are refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
+
+from spoofgym.detectors.base import Detector
+from spoofgym.responses.base import Response
+from spoofgym.scenario import Scenario
+
+KNOWLEDGE = ("blind", "shadow", "full")
+ACTIONS = ("rate", "innovation")
+ON_ALARM = ("end", "respond")
+
+Config = TypeVar("Config")
+
+
+def configure(kind: type[Config], arguments: dict[str, Any]) -> Config:
+    """Build a configuration from keyword arguments.
+
+    Raises:
+        TypeError: an unknown key; the message lists the valid ones.
+    """
+    valid = [item.name for item in fields(kind)]  # type: ignore[arg-type]
+    for key in arguments:
+        if key not in valid:
+            raise TypeError(f"unknown argument {key!r}; valid arguments: {', '.join(valid)}")
+    return kind(**arguments)
+
+
+def require(name: str, value: str, valid: tuple[str, ...]) -> None:
+    """Refuse a value that is not one of ``valid``.
+
+    Raises:
+        ValueError: naming the value and the valid ones.
+    """
+    if value not in valid:
+        raise ValueError(f"unknown {name} {value!r}; valid values: {', '.join(valid)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpooferConfig:
+    """Arguments of Spoofer-v0; the environment's page says what each means.
+
+    Raises:
+        ValueError: a name that is not valid, or a number out of range.
+    """
+
+    scenario: str | Scenario = "liu-flight"
+    detector: str | Detector | tuple[str | Detector, ...] = "snapshot"
+    knowledge: str = "shadow"
+    action: str = "rate"
+    fidelity: str = "linear"
+    on_alarm: str = "end"
+    response: str | Response = "exclude"
+    forfeit: float = 1.0
+    tracking_sigma: float = 0.0
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        require("knowledge", self.knowledge, KNOWLEDGE)
+        require("action", self.action, ACTIONS)
+        require("on_alarm", self.on_alarm, ON_ALARM)
+        if self.action == "innovation" and self.knowledge == "blind":
+            raise ValueError("action 'innovation' runs a shadow filter: knowledge must be 'shadow' or 'full', not 'blind'")
+        if not 0 <= self.forfeit:
+            raise ValueError(f"forfeit must be 0 or more, got {self.forfeit}")
+        if not 0 <= self.tracking_sigma < float("inf"):
+            raise ValueError(f"tracking_sigma must be 0 or more metres, got {self.tracking_sigma}")
+        if self.threads < 1:
+            raise ValueError(f"threads must be 1 or more, got {self.threads}")

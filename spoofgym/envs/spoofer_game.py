@@ -1,0 +1,214 @@
+"""The spoofer's game on N lanes: what the single and the vector environment have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from spoofgym.calibration import calibrated
+from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.observation import Squash, observation_space, spoofer_fields
+from spoofgym.envs.shadow import ShadowFilter
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.parallel import RunSlices
+from spoofgym.responses import make_response
+from spoofgym.scenarios import make_scenario
+from spoofgym.simulation import Simulation
+
+INNOVATION_UNIT = 4.0
+"""One unit of the innovation action, in sigma per axis."""
+
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one step of N lanes gave.
+
+    Attributes:
+        growth: reward for the growth of the error, (N,).
+        forfeit: what an alarm takes back, (N,).
+        alarm: whether a detector alarmed in this epoch of the game, (N,).
+        alarmed: whether one has alarmed since the game began, (N,).
+        terminated: the game is over, (N,).
+    """
+
+    growth: Floats
+    forfeit: Floats
+    alarm: Flags
+    alarmed: Flags
+    terminated: Flags
+
+    @property
+    def reward(self) -> Floats:
+        """The sum of the reward terms, (N,)."""
+        return self.growth + self.forfeit
+
+
+class SpooferGame:
+    """N lanes of the spoofer's game.
+
+    Attributes:
+        config: its arguments.
+        simulation: the world.
+        shadow: the spoofer's copy of the filter, or None for a blind one.
+        error: horizontal error of the estimate when last resolved, (N,), m.
+    """
+
+    def __init__(self, config: SpooferConfig, num_lanes: int) -> None:
+        """Set the game up.
+
+        Raises:
+            ValueError: a part that is unknown or does not fit the scenario.
+        """
+        self.config = config
+        scenario = make_scenario(config.scenario)
+        given = config.detector if isinstance(config.detector, tuple | list) else (config.detector,)
+        detectors: Sequence[Detector] = [calibrated(make_detector(detector), scenario) for detector in given]
+        response = make_response(config.response) if config.on_alarm == "respond" else None
+        self.simulation = Simulation(
+            scenario, None, detectors, response, num_lanes, fidelity=config.fidelity, threads=config.threads
+        )
+        self.scenario = scenario
+        self.num_lanes = num_lanes
+        self.shadow: ShadowFilter | None = None
+        if config.knowledge != "blind":
+            self.shadow = ShadowFilter(scenario.linear_model(), num_lanes, RunSlices(config.threads))
+        fields = spoofer_fields(config.knowledge, scenario.dimension, tuple(self.simulation.detectors))
+        self.fields = fields
+        self.observation_space = observation_space(fields)
+        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
+        self.error = np.zeros(num_lanes)
+        self._squash = Squash(fields)
+        self._start_error = np.zeros(num_lanes)
+        self._offset = np.zeros((num_lanes, 3))
+        self._velocity = scenario.velocity()
+        self._rate = np.array(scenario.drag_off_rate) * scenario.timeline.interval
+        self._horizon = scenario.timeline.num_epochs
+        self._all = np.arange(num_lanes)
+        self._tracking = np.zeros((num_lanes, self._horizon + 1, 6))
+        self._alarmed = np.zeros(num_lanes, dtype=bool)
+        self._nobody = np.zeros(num_lanes, dtype=bool)
+        self._thresholds = np.array([detector.threshold for detector in detectors])
+
+    @property
+    def index(self) -> Runs:
+        """Epoch of each lane, (N,)."""
+        return self.simulation.epoch.index
+
+    def reset(self, lanes: Runs) -> None:
+        """Start new games up to the clean epoch 0."""
+        self.simulation.reset(lanes)
+        self._begin(lanes)
+
+    def _begin(self, lanes: Runs) -> None:
+        error = self._horizontal()[lanes]
+        self.error[lanes] = error
+        self._start_error[lanes] = error
+        self._offset[lanes] = 0.0
+        self._alarmed[lanes] = False
+        if self.config.tracking_sigma:
+            sigma = self.config.tracking_sigma
+            for lane in lanes:
+                stream = self.simulation.streams(lane, "tracking")
+                self._tracking[lane] = sigma * stream.standard_normal(self._tracking.shape[1:])
+        if self.shadow is not None:
+            self.shadow.reset(lanes)
+
+    def _horizontal(self) -> Floats:
+        """Horizontal error of the estimate, (N,), m."""
+        error = self.simulation.error
+        return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
+
+    def step(self, actions: Floats, restarting: Runs | None = None) -> Outcome:
+        """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action.
+
+        Args:
+            actions: in [-1, 1], (N, 3).
+            restarting: indices of lanes.
+
+        Raises:
+            ValueError: an action is NaN or infinite, or has the wrong shape.
+        """
+        actions = np.asarray(actions, dtype=np.float64)
+        if actions.shape != (self.num_lanes, 3):
+            raise ValueError(f"actions must have shape ({self.num_lanes}, 3), got {actions.shape}")
+        if not np.isfinite(actions).all():
+            lane = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+            raise ValueError(f"action of lane {lane} is not finite: {actions[lane]}")
+        simulation = self.simulation
+        simulation.resolve()
+        error = self._horizontal()
+        previous = self._offset
+        self._offset = self._intend(np.clip(actions, -1.0, 1.0), previous)
+        if restarting is not None and len(restarting):
+            simulation.restart(restarting)
+            self._offset[restarting] = 0.0
+        sent = self._offset
+        if self.config.tracking_sigma:
+            following = np.minimum(simulation.epoch.index + 1, self._horizon)
+            sent = sent + self._tracking[self._all, following, :3]
+            if restarting is not None:
+                sent[restarting] = 0.0
+        epoch = simulation.observe(sent)
+        if restarting is not None and len(restarting):
+            self._begin(restarting)
+            error[restarting] = self.error[restarting]
+        if self.shadow is not None:
+            self.shadow.advance(epoch.index, self._offset, previous, self.scenario.timeline.interval)
+        return self._score(error)
+
+    def _intend(self, actions: Floats, previous: Floats) -> Floats:
+        """The offset that the spoofer means to send, (N, 3), m ENU."""
+        if self.config.action == "rate":
+            return previous + actions * self._rate
+        assert self.shadow is not None
+        following = np.minimum(self.index + 1, self._horizon)
+        return self.shadow.offset_for(following, INNOVATION_UNIT * actions)
+
+    def _score(self, error: Floats) -> Outcome:
+        """Rewards and ends after the new epoch; ``error`` is that of the epoch just resolved, (N,)."""
+        index = self.simulation.epoch.index
+        alarm = self.simulation.alarm & (index > 0)
+        self._alarmed = self._alarmed | alarm
+        caught = alarm if self.config.on_alarm == "end" else self._nobody
+        last = (index == self._horizon) & ~caught
+        if last.any():
+            lanes = np.flatnonzero(last)
+            self.simulation.resolve(runs=lanes)
+            error[lanes] = self._horizontal()[lanes]
+        scale = self.scenario.error_scale
+        growth = (error - self.error) / scale
+        forfeit = np.where(caught, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
+        self.error = error
+        return Outcome(growth, forfeit, alarm, self._alarmed, caught | last)
+
+    def observation(self) -> NDArray[np.float32]:
+        """What each lane's spoofer sees, (N, D)."""
+        epoch, scenario = self.simulation.epoch, self.scenario
+        raw = np.empty((self.num_lanes, len(self.fields)))
+        raw[:, 0:3] = self._offset
+        raw[:, 3] = epoch.index / self._horizon
+        raw[:, 4:7] = self._velocity[epoch.index]
+        if self.config.tracking_sigma:
+            raw[:, 4:7] += self._tracking[self._all, epoch.index, 3:] / scenario.timeline.interval
+        raw[:, 7] = self.config.tracking_sigma
+        column = 8
+        if self.shadow is not None:
+            m = scenario.dimension
+            for part in (self.shadow.whitened, self.shadow.coming, self.shadow.mean[:, 6:9], self.shadow.mean[:, 3:6]):
+                raw[:, column : column + part.shape[1]] = part
+                column += part.shape[1]
+            if self.config.knowledge == "full":
+                raw[:, column : column + m] = epoch.innovation.whitened
+                column += m
+                for statistic, threshold in zip(epoch.statistics.values(), self._thresholds, strict=True):
+                    raw[:, column] = statistic / threshold
+                    raw[:, column + 1] = threshold
+                    column += 2
+        return self._squash(raw)

@@ -1,0 +1,250 @@
+"""The kernels of the strapdown fidelity: loops over runs, whose equations stand in the modules they call."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from spoofgym.geodesy import enu_difference, enu_displacement
+from spoofgym.navigation import kalman
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.mechanization import mechanize
+from spoofgym.sensors.imu import gauss_markov_step, white_sample
+
+# rows of the state kept when a fix is taken
+POSITION, VELOCITY, FORCE, ATTITUDE = 0, 1, 2, 3
+
+
+@njit(cache=True, nogil=True)
+def propagate(
+    runs: Runs,
+    index: Runs,
+    attitude: Floats,
+    velocity: Floats,
+    position: Floats,
+    bias: Floats,
+    true_bias: Floats,
+    instability: Floats,
+    covariance: Floats,
+    fix: Floats,
+    normals: Floats,
+    epoch_normals: Floats,
+    angular_rate: Floats,
+    specific_force: Floats,
+    step: Floats,
+    boundaries: Runs,
+    latency_samples: int,
+    filter_density: Floats,
+    true_noise: Floats,
+    instability_sigma: Floats,
+    instability_decay: float,
+) -> None:
+    """Carry runs over one epoch: mechanization, covariance, and the state kept when the fix is taken.
+
+    Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (n, samples or 0, 6) and epoch_normals (n, 9) stand at the places
+    of the runs.
+    """
+    rate, force, mean_force = np.empty(3), np.empty(3), np.empty(3)
+    middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
+    dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
+    transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
+    half_noise = np.zeros((NUM_STATES, NUM_STATES))
+    noisy = normals.shape[1] > 0
+    for place in range(len(runs)):
+        run = runs[place]
+        index[run] += 1
+        start, stop = boundaries[index[run]], boundaries[index[run] + 1]
+        middle = start + (stop - start) // 2
+        mean_force[:] = 0.0
+        interval = 0.0
+        for i in range(start, stop):
+            if i == middle:
+                middle_attitude[:, :] = attitude[run]
+                middle_velocity[:] = velocity[run]
+                middle_position[:] = position[run]
+            if i == stop - latency_samples:
+                _keep_fix(attitude[run], velocity[run], position[run], fix[run])
+            for a in range(3):
+                rate[a] = angular_rate[i, a] + true_bias[run, a] - bias[run, a]
+                force[a] = specific_force[i, a] + true_bias[run, 3 + a] - bias[run, 3 + a]
+            if noisy:
+                for a in range(3):
+                    rate[a] += white_sample(true_noise[a], step[i], normals[place, i - start, a])
+                    force[a] += white_sample(true_noise[3 + a], step[i], normals[place, i - start, 3 + a])
+            mechanize(attitude[run], velocity[run], position[run], rate, force, step[i], mean_force)
+            interval += step[i]
+        for a in range(3):
+            mean_force[a] /= interval
+        navigation_dynamics(middle_velocity, middle_position, mean_force, dynamics)
+        transition_matrix(dynamics, middle_attitude, interval, transition, work)
+        for i in range(NUM_STATES):
+            half_noise[i, i] = 0.5 * interval * filter_density[i]
+            covariance[run, i, i] += half_noise[i, i]
+        kalman.predict_covariance(transition, half_noise, covariance[run], product)
+        if noisy:
+            _disturb_position(position[run], true_noise, np.sqrt(interval), epoch_normals[place])
+            _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, epoch_normals[place])
+        if latency_samples == 0:
+            _keep_fix(attitude[run], velocity[run], position[run], fix[run])
+        for a in range(3):
+            fix[run, FORCE, a] = mean_force[a]
+
+
+@njit(cache=True, nogil=True)
+def _keep_fix(attitude: Floats, velocity: Floats, position: Floats, fix: Floats) -> None:
+    for a in range(3):
+        fix[POSITION, a] = position[a]
+        fix[VELOCITY, a] = velocity[a]
+        for b in range(3):
+            fix[ATTITUDE + a, b] = attitude[a, b]
+
+
+@njit(cache=True, nogil=True)
+def _disturb_position(position: Floats, true_noise: Floats, root: float, normals: Floats) -> None:
+    """The random walk of the navigation computation over an epoch."""
+    latitude, longitude, height = enu_displacement(
+        position[0],
+        position[1],
+        position[2],
+        root * true_noise[6] * normals[0],
+        root * true_noise[7] * normals[1],
+        root * true_noise[8] * normals[2],
+    )
+    position[0], position[1], position[2] = latitude, longitude, height
+
+
+@njit(cache=True, nogil=True)
+def _drift_bias(true_bias: Floats, instability: Floats, sigma: Floats, decay: float, normals: Floats) -> None:
+    """One epoch of the Gauss-Markov bias instability; the bias is held within an epoch."""
+    for a in range(6):
+        following = gauss_markov_step(instability[a], sigma[a], decay, normals[3 + a])
+        true_bias[a] += following - instability[a]
+        instability[a] = following
+
+
+@njit(cache=True, nogil=True)
+def innovate(
+    places: Runs,
+    runs: Runs,
+    index: Runs,
+    fix: Floats,
+    covariance: Floats,
+    fix_position: Floats,
+    fix_velocity: Floats,
+    lever_arm: Floats,
+    latency: float,
+    measurement_covariance: Floats,
+    deviation: Floats,
+    innovation: Floats,
+    gain: Floats,
+    residual: Floats,
+    whitened: Floats,
+    nis: Floats,
+) -> None:
+    """Innovation of runs with their own S, and the whitened gain; outputs but the gain stand at the places of the runs."""
+    m = residual.shape[1]
+    observation, arm = np.zeros((m, NUM_NAVIGATION)), np.empty(3)
+    cross, factor = np.empty((NUM_STATES, m)), np.empty((m, m))
+    for place in places:
+        run = runs[place]
+        k = index[run]
+        for a in range(3):
+            arm[a] = 0.0
+            for b in range(3):
+                arm[a] += fix[run, ATTITUDE + a, b] * lever_arm[b]
+        _observation(arm, fix[run, FORCE], latency, observation)
+        difference = enu_difference(
+            fix[run, POSITION, 0],
+            fix[run, POSITION, 1],
+            fix[run, POSITION, 2],
+            fix_position[k, 0],
+            fix_position[k, 1],
+            fix_position[k, 2],
+        )
+        for a in range(3):
+            residual[place, a] = difference[a] + arm[a] - deviation[place, a]
+        for a in range(3, m):
+            residual[place, a] = fix[run, VELOCITY, a - 3] - fix_velocity[k, a - 3] - deviation[place, a]
+        kalman.innovation_covariance(
+            covariance[run], observation, measurement_covariance[k], cross, innovation[place]
+        )
+        kalman.cholesky(innovation[place], factor)
+        kalman.whitened_gain(cross, factor, gain[run])
+        nis[place] = kalman.whiten(factor, residual[place], whitened[place])
+
+
+@njit(cache=True, nogil=True)
+def _observation(arm: Floats, force: Floats, latency: float, observation: Floats) -> None:
+    """H on the nine navigation states: z = δp + (C l) x φ - τ δv, and with velocity z_v = δv - τ f x φ."""
+    _put_cross(observation, 0, arm, 1.0)
+    for a in range(3):
+        observation[a, 3 + a] = -latency
+        observation[a, 6 + a] = 1.0
+    if observation.shape[0] == 6:
+        _put_cross(observation, 3, force, -latency)
+        for a in range(3):
+            observation[3 + a, 3 + a] = 1.0
+
+
+@njit(cache=True, nogil=True)
+def _put_cross(observation: Floats, row: int, vector: Floats, factor: float) -> None:
+    """Write factor [v x] into the attitude columns."""
+    x, y, z = factor * vector[0], factor * vector[1], factor * vector[2]
+    observation[row, 1], observation[row, 2] = -z, y
+    observation[row + 1, 0], observation[row + 1, 2] = z, -x
+    observation[row + 2, 0], observation[row + 2, 1] = -y, x
+
+
+@njit(cache=True, nogil=True)
+def resolve(
+    runs: Runs,
+    attitude: Floats,
+    velocity: Floats,
+    position: Floats,
+    bias: Floats,
+    covariance: Floats,
+    gain: Floats,
+    whitened: Floats,
+) -> None:
+    """Subtract the estimated error x̂ = U w; P <- P - U U'."""
+    estimate = np.empty(NUM_STATES)
+    for run in runs:
+        for i in range(NUM_STATES):
+            estimate[i] = kalman.correction(gain[run], whitened[run], i)
+        rotate(attitude[run], estimate[0], estimate[1], estimate[2])
+        for a in range(3):
+            velocity[run, a] -= estimate[3 + a]
+        latitude, longitude, height = enu_displacement(
+            position[run, 0], position[run, 1], position[run, 2], -estimate[6], -estimate[7], -estimate[8]
+        )
+        position[run, 0], position[run, 1], position[run, 2] = latitude, longitude, height
+        for a in range(6):
+            bias[run, a] += estimate[9 + a]
+        kalman.update_covariance(gain[run], covariance[run])
+
+
+@njit(cache=True, nogil=True)
+def rotate(attitude: Floats, x: float, y: float, z: float) -> None:
+    """C <- (I + [θ x]) C, made orthonormal again by three steps of C <- C (3 I - C'C) / 2; in place."""
+    for j in range(3):
+        a, b, c = attitude[0, j], attitude[1, j], attitude[2, j]
+        attitude[0, j] = a - z * b + y * c
+        attitude[1, j] = b + z * a - x * c
+        attitude[2, j] = c - y * a + x * b
+    product, result = np.empty((3, 3)), np.empty((3, 3))
+    for _ in range(3):
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    total += attitude[k, i] * attitude[k, j]
+                product[i, j] = -total
+            product[i, i] += 3.0
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    total += attitude[i, k] * product[k, j]
+                result[i, j] = 0.5 * total
+        attitude[:, :] = result

@@ -1,0 +1,179 @@
+"""The equations of the error-state Kalman filter, one run at a time.
+
+Every function works in place on one run's arrays, so that a navigator's loop over runs allocates nothing. The measurement touches the
+nine navigation states only (H is (m, 9)), the six bias states are random constants or walks: Φ = [[Φn, Φb], [0, I]] with rows (9, 15)
+stored.
+
+The update is written in whitened form: with S = L L', U = P H' L⁻ᵀ and w = L⁻¹ z,
+
+    K z = U w,        P⁺ = P - U U',        NIS = w' w,
+
+which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. Source: Bar-Shalom, Li and Kirubarajan
+2001, ch. 5, rearranged.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from spoofgym.arrays import Floats
+
+N = 9
+FULL = 15
+
+
+@njit(cache=True, nogil=True)
+def predict_error(transition: Floats, noise: Floats, error: Floats, work: Floats) -> None:
+    """x <- Φ x + w.
+
+    Args:
+        transition: first nine rows of Φ, (9, 15).
+        noise: w, (15,).
+        error: x, (15,), in place.
+        work: (9,).
+    """
+    for i in range(N):
+        total = noise[i]
+        for j in range(FULL):
+            total += transition[i, j] * error[j]
+        work[i] = total
+    for i in range(N):
+        error[i] = work[i]
+    for i in range(N, FULL):
+        error[i] += noise[i]
+
+
+@njit(cache=True, nogil=True)
+def predict_covariance(transition: Floats, process_noise: Floats, covariance: Floats, work: Floats) -> None:
+    """P <- Φ P Φ' + Q.
+
+    Args:
+        transition: first nine rows of Φ, (9, 15).
+        process_noise: Q, (15, 15).
+        covariance: P, (15, 15), in place.
+        work: (9, 15).
+    """
+    for i in range(N):
+        for j in range(FULL):
+            work[i, j] = 0.0
+        for k in range(FULL):
+            factor = transition[i, k]
+            for j in range(FULL):
+                work[i, j] += factor * covariance[k, j]
+    for i in range(N):
+        for j in range(i + 1):
+            total = process_noise[i, j]
+            for k in range(FULL):
+                total += work[i, k] * transition[j, k]
+            covariance[i, j] = total
+            covariance[j, i] = total
+        for j in range(N, FULL):
+            covariance[i, j] = work[i, j] + process_noise[i, j]
+            covariance[j, i] = covariance[i, j]
+    for i in range(N, FULL):
+        for j in range(N, FULL):
+            covariance[i, j] += process_noise[i, j]
+
+
+@njit(cache=True, nogil=True)
+def innovation_covariance(
+    covariance: Floats, observation: Floats, noise_covariance: Floats, cross: Floats, innovation: Floats
+) -> None:
+    """PH' and S = H P H' + R.
+
+    Args:
+        covariance: P, (15, 15).
+        observation: H, (m, 9).
+        noise_covariance: R, (m, m).
+        cross: PH', (15, m), overwritten.
+        innovation: S, (m, m), overwritten.
+    """
+    m = observation.shape[0]
+    for i in range(FULL):
+        for a in range(m):
+            total = 0.0
+            for k in range(N):
+                total += covariance[i, k] * observation[a, k]
+            cross[i, a] = total
+    for a in range(m):
+        for b in range(m):
+            total = noise_covariance[a, b]
+            for k in range(N):
+                total += observation[a, k] * cross[k, b]
+            innovation[a, b] = total
+
+
+@njit(cache=True, nogil=True)
+def cholesky(matrix: Floats, factor: Floats) -> None:
+    """Lower L with matrix = L L'; (m, m)."""
+    m = matrix.shape[0]
+    for i in range(m):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i == j:
+                factor[i, i] = np.sqrt(total)
+            else:
+                factor[i, j] = total / factor[j, j]
+                factor[j, i] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
+    """U = P H' L⁻ᵀ.
+
+    Args:
+        cross: PH', (15, m).
+        factor: L, (m, m).
+        gain: U, (15, m), overwritten.
+    """
+    m = factor.shape[0]
+    for i in range(FULL):
+        for a in range(m):
+            total = cross[i, a]
+            for b in range(a):
+                total -= factor[a, b] * gain[i, b]
+            gain[i, a] = total / factor[a, a]
+
+
+@njit(cache=True, nogil=True)
+def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
+    """w = L⁻¹ z, and the NIS w' w.
+
+    Args:
+        factor: L, (m, m).
+        residual: z, (m,).
+        whitened: w, (m,), overwritten.
+    """
+    nis = 0.0
+    for a in range(factor.shape[0]):
+        total = residual[a]
+        for b in range(a):
+            total -= factor[a, b] * whitened[b]
+        whitened[a] = total / factor[a, a]
+        nis += whitened[a] * whitened[a]
+    return nis
+
+
+@njit(cache=True, nogil=True)
+def update_covariance(gain: Floats, covariance: Floats) -> None:
+    """P <- P - U U'; gain U (15, m), covariance (15, 15) in place."""
+    m = gain.shape[1]
+    for i in range(FULL):
+        for j in range(i + 1):
+            total = covariance[i, j]
+            for a in range(m):
+                total -= gain[i, a] * gain[j, a]
+            covariance[i, j] = total
+            covariance[j, i] = total
+
+
+@njit(cache=True, nogil=True)
+def correction(gain: Floats, whitened: Floats, row: int) -> float:
+    """One element of K z = U w."""
+    total = 0.0
+    for a in range(gain.shape[1]):
+        total += gain[row, a] * whitened[a]
+    return total

@@ -1,0 +1,255 @@
+"""The error state along a true trajectory, one step per GNSS epoch: Φ, Q, H, and the gains of a filter that uses every fix.
+
+Liu 2018, section 4.1: a spoofing offset of kilometres changes Φ and the gain by less than 1e-3, so they can be computed once along the
+truth and serve every run. The transition is the product over the IMU samples of the epoch, not a series in the epoch's length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from spoofgym.navigation import kalman
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
+from spoofgym.arrays import Floats
+from spoofgym.navigation.interface import Timeline
+from spoofgym.navigation.tuning import FilterTuning, true_noise_density
+from spoofgym.sensors.imu import ImuGrade
+from spoofgym.sensors.receiver import Receiver
+from spoofgym.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class ErrorDynamics:
+    """What the trajectory makes of an error, epoch by epoch; leading axis: epochs.
+
+    Attributes:
+        transition: Φ from the epoch before, (E, 15, 15).
+        process_noise: the filter's Q, (E, 15, 15).
+        true_noise: covariance of the white noise that really acts on attitude, velocity and position, (E, 9, 9).
+        observation: H on the nine navigation states, (E, m, 9).
+    """
+
+    transition: Floats
+    process_noise: Floats
+    true_noise: Floats
+    observation: Floats
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """A game in the linear fidelity: epochs k = 0..K, of which 0 is the last clean one.
+
+    Attributes:
+        time: of the epochs, (K+1,), s.
+        transition: Φ from epoch k-1 to k, (K+1, 15, 15).
+        process_noise: the filter's Q of that step, (K+1, 15, 15).
+        noise_factor: lower Cholesky factor of the true noise on attitude, velocity and position, (K+1, 9, 9).
+        observation: H on the nine navigation states, (K+1, m, 9).
+        measurement_covariance: the filter's R, (m, m).
+        prior_covariance: the filter's P after epoch -1, (15, 15).
+        covariance: the filter's P at epoch k before the fix, every fix used, (K+1, 15, 15).
+        innovation_covariance: S, (K+1, m, m).
+        innovation_factor: lower L with S = L L', (K+1, m, m).
+        whitened_gain: U = P H' L⁻ᵀ, so that the gain is U L⁻¹, (K+1, 15, m).
+    """
+
+    time: Floats
+    transition: Floats
+    process_noise: Floats
+    noise_factor: Floats
+    observation: Floats
+    measurement_covariance: Floats
+    prior_covariance: Floats
+    covariance: Floats
+    innovation_covariance: Floats
+    innovation_factor: Floats
+    whitened_gain: Floats
+
+    @property
+    def dimension(self) -> int:
+        """m, of the fix."""
+        return self.observation.shape[1]
+
+    @property
+    def num_epochs(self) -> int:
+        """K."""
+        return len(self.time) - 1
+
+
+def error_dynamics(
+    trajectory: Trajectory,
+    grade: ImuGrade,
+    receiver: Receiver,
+    tuning: FilterTuning,
+    true_position_random_walk: float,
+    num_epochs: int,
+) -> ErrorDynamics:
+    """Φ, Q and H from the start of the trajectory over ``num_epochs`` GNSS epochs.
+
+    Args:
+        trajectory: the truth, sampled at the IMU rate.
+        grade: of the IMU.
+        receiver: gives the epochs, the lever arm and the latency.
+        tuning: gives the filter's process noise.
+        true_position_random_walk: what really acts on the position, m/√s.
+        num_epochs: E.
+
+    Returns:
+        Arrays of E epochs; the first ends one interval after the start.
+    """
+    samples = receiver.samples_per_fix(trajectory.rate)
+    filter_density = np.diag(tuning.noise_density(grade))
+    true_density = np.zeros((NUM_STATES, NUM_STATES))
+    np.fill_diagonal(true_density[:NUM_NAVIGATION], true_noise_density(grade, true_position_random_walk))
+    transition = np.empty((num_epochs, NUM_STATES, NUM_STATES))
+    noise = np.empty((2, num_epochs, NUM_STATES, NUM_STATES))
+    _accumulate(
+        trajectory.attitude,
+        trajectory.velocity,
+        trajectory.position,
+        trajectory.specific_force,
+        1.0 / trajectory.rate,
+        samples,
+        np.stack([filter_density, true_density]) / trajectory.rate,
+        transition,
+        noise,
+    )
+    ends = samples * np.arange(1, num_epochs + 1)
+    observation = observation_matrices(trajectory, receiver, ends)
+    return ErrorDynamics(transition, noise[0], noise[1, :, :NUM_NAVIGATION, :NUM_NAVIGATION], observation)
+
+
+def observation_matrices(trajectory: Trajectory, receiver: Receiver, samples: np.ndarray) -> Floats:
+    """H on the nine navigation states at IMU samples, (E, m, 9).
+
+    The antenna sits at the lever arm l and the fix is τ old: z = δp + (C l) x φ - τ δv, and with velocity z_v = δv - τ f x φ.
+    """
+    attitude = trajectory.attitude[samples]
+    arm = np.array([[sum(c[i, j] * receiver.lever_arm[j] for j in range(3)) for i in range(3)] for c in attitude])
+    observation = np.zeros((len(samples), receiver.dimension, NUM_NAVIGATION))
+    observation[:, :3, 0:3] = _cross(arm)
+    observation[:, range(3), range(3, 6)] = -receiver.latency
+    observation[:, range(3), range(6, 9)] = 1.0
+    if receiver.dimension == 6:
+        force = np.einsum("eij,ej->ei", attitude, trajectory.specific_force[samples - 1])
+        observation[:, 3:, 0:3] = -receiver.latency * _cross(force)
+        observation[:, range(3, 6), range(3, 6)] = 1.0
+    return observation
+
+
+def _cross(vectors: Floats) -> Floats:
+    """Cross-product matrices [v x], (E, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+
+
+def linear_model(dynamics: ErrorDynamics, prior_covariance: Floats, tuning: FilterTuning, timeline: Timeline) -> LinearModel:
+    """The game on epochs 0..K of ``dynamics``, every fix used.
+
+    Args:
+        dynamics: of the K+1 epochs of the game.
+        prior_covariance: the filter's P after epoch -1, (15, 15).
+        tuning: gives R.
+        timeline: of the game.
+    """
+    covariance, factor, gain, innovation = filter_gains(dynamics, prior_covariance, tuning.measurement_covariance)
+    return LinearModel(
+        time=timeline.start + timeline.interval * np.arange(timeline.num_epochs + 1),
+        transition=dynamics.transition,
+        process_noise=dynamics.process_noise,
+        noise_factor=np.array([semidefinite_factor(q) for q in dynamics.true_noise]),
+        observation=dynamics.observation,
+        measurement_covariance=tuning.measurement_covariance,
+        prior_covariance=prior_covariance,
+        covariance=covariance,
+        innovation_covariance=innovation,
+        innovation_factor=factor,
+        whitened_gain=gain,
+    )
+
+
+def filter_gains(
+    dynamics: ErrorDynamics, prior_covariance: Floats, measurement_covariance: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """The filter's covariance recursion with every fix used.
+
+    Returns:
+        P before the fix (E, 15, 15), L (E, m, m), U (E, 15, m), S (E, m, m).
+    """
+    epochs, m, _ = dynamics.observation.shape
+    prior = np.empty((epochs, NUM_STATES, NUM_STATES))
+    factor, innovation = np.empty((epochs, m, m)), np.empty((epochs, m, m))
+    gain = np.empty((epochs, NUM_STATES, m))
+    covariance = prior_covariance.copy()
+    cross, work = np.empty((NUM_STATES, m)), np.empty((NUM_NAVIGATION, NUM_STATES))
+    for k in range(epochs):
+        kalman.predict_covariance(dynamics.transition[k], dynamics.process_noise[k], covariance, work)
+        prior[k] = covariance
+        kalman.innovation_covariance(covariance, dynamics.observation[k], measurement_covariance, cross, innovation[k])
+        kalman.cholesky(innovation[k], factor[k])
+        kalman.whitened_gain(cross, factor[k], gain[k])
+        kalman.update_covariance(gain[k], covariance)
+    return prior, factor, gain, innovation
+
+
+def semidefinite_factor(covariance: Floats) -> Floats:
+    """A square root of a symmetric positive semidefinite matrix, scaled so that small blocks keep their digits.
+
+    Lower triangular where the matrix is definite; from the eigenvectors of the correlation matrix where it is singular.
+    """
+    scale = np.sqrt(np.diag(covariance))
+    positive = scale > 0
+    factor = np.zeros_like(covariance)
+    inner = covariance[np.ix_(positive, positive)] / np.outer(scale[positive], scale[positive])
+    try:
+        root = np.linalg.cholesky(inner)
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(inner)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+    factor[np.ix_(positive, positive)] = scale[positive, None] * root
+    return factor
+
+
+@njit(cache=True, nogil=True)
+def _accumulate(
+    attitude: Floats,
+    velocity: Floats,
+    position: Floats,
+    specific_force: Floats,
+    step: float,
+    samples: int,
+    densities: Floats,
+    transition: Floats,
+    noise: Floats,
+) -> None:
+    """Multiply the transitions of the IMU samples of every epoch, and carry the noise of each sample to the epoch's end."""
+    dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
+    one = np.empty((NUM_NAVIGATION, NUM_STATES))
+    product = np.empty((NUM_NAVIGATION, NUM_STATES))
+    force, middle = np.empty(3), np.empty((3, 3))
+    for epoch in range(transition.shape[0]):
+        total = transition[epoch]
+        total[:, :] = np.eye(NUM_STATES)
+        noise[0, epoch, :, :] = 0.0
+        noise[1, epoch, :, :] = 0.0
+        for i in range(epoch * samples, (epoch + 1) * samples):
+            middle[:, :] = 0.5 * (attitude[i] + attitude[i + 1])
+            for a in range(3):
+                force[a] = 0.0
+                for b in range(3):
+                    force[a] += middle[a, b] * specific_force[i, b]
+            navigation_dynamics(velocity[i], position[i], force, dynamics)
+            transition_matrix(dynamics, middle, step, one, work)
+            for a in range(NUM_NAVIGATION):
+                for b in range(NUM_STATES):
+                    product[a, b] = 0.0
+                for c in range(NUM_STATES):
+                    for b in range(NUM_STATES):
+                        product[a, b] += one[a, c] * total[c, b]
+            total[:NUM_NAVIGATION, :] = product
+            kalman.predict_covariance(one, densities[0], noise[0, epoch], product)
+            kalman.predict_covariance(one, densities[1], noise[1, epoch], product)

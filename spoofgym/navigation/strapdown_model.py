@@ -1,0 +1,131 @@
+"""A game in the strapdown fidelity: the inertial samples, the fixes' reference positions, and what starts each episode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spoofgym.geodesy import displace
+from spoofgym.arrays import Floats
+from spoofgym.navigation.interface import Timeline
+from spoofgym.navigation.tuning import FilterTuning, true_noise_density
+from spoofgym.sensors.imu import ImuGrade
+from spoofgym.sensors.receiver import Receiver
+from spoofgym.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class StrapdownModel:
+    """What N strapdown navigators have in common: epochs k = 0..K, of which 0 is the last clean one.
+
+    The samples come from a true trajectory, with sensor errors added per run, or from a recorded log, whose samples have their own.
+
+    Attributes:
+        time: of the epochs, (K+1,), s.
+        angular_rate: inertial samples, body R, F, U, (n, 3), rad/s.
+        specific_force: the same, m/s².
+        step: duration of each sample, (n,), s.
+        boundaries: samples boundaries[k]..boundaries[k+1] lead to epoch k, (K+2,).
+        fix_position: of the antenna when the fix was taken, without receiver noise, (K+1, 3), latitude rad, longitude rad, height m.
+        fix_velocity: the same, ENU, (K+1, 3), m/s.
+        true_position: against which the error is formed, (K+1, 3).
+        lever_arm: of the antenna, body R, F, U, (3,), m.
+        latency_samples: inertial samples between the fix and its epoch.
+        measurement_covariance: the filter's R, (K+1, m, m).
+        filter_density: the filter's process noise, (15,), unit²/s.
+        true_noise: standard deviation density of the noise that acts on angular rate, specific force and position of each run, (9,).
+        instability_sigma: of the biases, (6,); `instability_decay`: over an epoch.
+        attitude: before epoch 0, body to ENU, (3, 3).
+        velocity: before epoch 0, (3,) ENU, m/s.
+        position: before epoch 0, (3,).
+        prior_covariance: the filter's P before epoch 0, (15, 15).
+    """
+
+    time: Floats
+    angular_rate: Floats
+    specific_force: Floats
+    step: Floats
+    boundaries: NDArray[np.int64]
+    fix_position: Floats
+    fix_velocity: Floats
+    true_position: Floats
+    lever_arm: Floats
+    latency_samples: int
+    measurement_covariance: Floats
+    filter_density: Floats
+    true_noise: Floats
+    instability_sigma: Floats
+    instability_decay: float
+    attitude: Floats
+    velocity: Floats
+    position: Floats
+    prior_covariance: Floats
+
+    @property
+    def dimension(self) -> int:
+        """m, of the fix."""
+        return self.measurement_covariance.shape[1]
+
+    @property
+    def num_epochs(self) -> int:
+        """K."""
+        return len(self.time) - 1
+
+    @property
+    def max_samples(self) -> int:
+        """Inertial samples of the longest epoch."""
+        return int(np.max(np.diff(self.boundaries)))
+
+
+def strapdown_model(
+    trajectory: Trajectory,
+    grade: ImuGrade,
+    receiver: Receiver,
+    tuning: FilterTuning,
+    true_position_random_walk: float,
+    prior_covariance: Floats,
+    timeline: Timeline,
+) -> StrapdownModel:
+    """The game on the part of ``trajectory`` from one interval before ``timeline.start`` to its end.
+
+    Args:
+        trajectory: the truth, sampled at the IMU rate.
+        grade: of the IMU.
+        receiver: gives epochs, lever arm and latency.
+        tuning: gives the filter's noise.
+        true_position_random_walk: what really acts on the position, m/√s.
+        prior_covariance: the filter's P after epoch -1, (15, 15).
+        timeline: of the game.
+    """
+    samples = receiver.samples_per_fix(trajectory.rate)
+    first = round((timeline.start - timeline.interval) * trajectory.rate)
+    boundaries = samples * np.arange(timeline.num_epochs + 2)
+    ends = first + boundaries[1:]
+    used = slice(first, int(ends[-1]))
+    taken = ends - round(receiver.latency * trajectory.rate)
+    arm = np.array([[sum(c[i, j] * receiver.lever_arm[j] for j in range(3)) for i in range(3)] for c in trajectory.attitude[taken]])
+    return StrapdownModel(
+        time=timeline.start + timeline.interval * np.arange(timeline.num_epochs + 1),
+        angular_rate=trajectory.angular_rate[used],
+        specific_force=trajectory.specific_force[used],
+        step=np.full(used.stop - first, 1.0 / trajectory.rate),
+        boundaries=boundaries,
+        fix_position=displace(trajectory.position[taken], arm),
+        fix_velocity=trajectory.velocity[taken],
+        true_position=trajectory.position[ends],
+        lever_arm=np.array(receiver.lever_arm, dtype=float),
+        latency_samples=round(receiver.latency * trajectory.rate),
+        measurement_covariance=np.broadcast_to(
+            tuning.measurement_covariance, (len(ends), receiver.dimension, receiver.dimension)
+        ),
+        filter_density=tuning.noise_density(grade),
+        true_noise=np.sqrt(true_noise_density(grade, true_position_random_walk)),
+        instability_sigma=grade.instability_sigma,
+        instability_decay=float(np.exp(-receiver.interval / grade.correlation_time)),
+        attitude=trajectory.attitude[first],
+        velocity=trajectory.velocity[first],
+        position=trajectory.position[first],
+        prior_covariance=prior_covariance,
+    )

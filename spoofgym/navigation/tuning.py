@@ -1,0 +1,70 @@
+"""What a loosely coupled filter believes: its initial uncertainty, process noise and measurement noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spoofgym.arrays import Floats
+from spoofgym.sensors.imu import ImuGrade
+
+ARCSECOND = np.pi / (180.0 * 3600.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterTuning:
+    """The settings of the 15-state filter, SI units.
+
+    Attributes:
+        attitude_sigma: initial attitude error (E, N, U), 1 sigma, rad.
+        velocity_sigma: initial velocity error (E, N, U), m/s.
+        position_sigma: initial position error (E, N, U), m.
+        initial_scale: the filter starts with (initial_scale x sigma)², while the true initial error has 1 sigma (Liu 2018, appendix D:
+            3); the bias sigmas are the data sheet's.
+        position_random_walk: process noise of the position, m/√s: the errors of the navigation computation.
+        process_noise_scale: factor on the variance of the inertial process noise.
+        measurement_sigma: the filter's R, 1 sigma per axis of the fix, (3,) m or (6,) m and m/s.
+    """
+
+    attitude_sigma: tuple[float, float, float] = (20 * ARCSECOND, 20 * ARCSECOND, 180 * ARCSECOND)
+    velocity_sigma: tuple[float, float, float] = (0.1, 0.1, 0.1)
+    position_sigma: tuple[float, float, float] = (3.7, 3.7, 6.0)
+    initial_scale: float = 3.0
+    position_random_walk: float = 1.0 / 60.0
+    process_noise_scale: float = 1.0
+    measurement_sigma: tuple[float, ...] = (3.7, 3.7, 6.0)
+
+    def __post_init__(self) -> None:
+        if len(self.measurement_sigma) not in (3, 6) or min(self.measurement_sigma) <= 0:
+            raise ValueError(f"measurement_sigma must be 3 or 6 positive numbers, got {self.measurement_sigma}")
+        for name in ("initial_scale", "process_noise_scale"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+        if not self.position_random_walk >= 0:
+            raise ValueError(f"position_random_walk must not be negative, got {self.position_random_walk}")
+
+    def initial_sigma(self, grade: ImuGrade) -> Floats:
+        """True 1-sigma initial error of the 15 states."""
+        total_bias = np.hypot(grade.bias_sigma, grade.instability_sigma)
+        return np.concatenate([self.attitude_sigma, self.velocity_sigma, self.position_sigma, total_bias])
+
+    def noise_density(self, grade: ImuGrade) -> Floats:
+        """The filter's process noise density of the 15 states, (15,), unit²/s.
+
+        A Gauss-Markov bias of the data sheet is modelled as the random walk of the same driving noise, 2 σ² / τ.
+        """
+        walk = 2.0 * grade.instability_sigma**2 / grade.correlation_time
+        inertial = np.concatenate([grade.noise_density**2, np.full(3, self.position_random_walk**2), walk])
+        inertial[:6] *= self.process_noise_scale
+        return inertial
+
+    @property
+    def measurement_covariance(self) -> Floats:
+        """R, (m, m)."""
+        return np.diag(np.square(self.measurement_sigma))
+
+
+def true_noise_density(grade: ImuGrade, position_random_walk: float) -> Floats:
+    """Density of the white noise that really acts on attitude, velocity and position, (9,), unit²/s."""
+    return np.concatenate([grade.noise_density**2, np.full(3, position_random_walk**2)])

@@ -1,0 +1,42 @@
+"""The base class of every response."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from numpy import bool_
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Runs
+from spoofgym.navigation.interface import Decision, Epoch
+
+
+class Response(ABC):
+    """What follows an alarm, in N runs.
+
+    Attributes:
+        excludes: whether it can ever leave a fix out: each run then needs a covariance of its own.
+    """
+
+    excludes: bool = True
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The specification that builds this response."""
+
+    def bind(self, num_runs: int) -> None:
+        """Allocate the memory of ``num_runs`` runs."""
+        self._num_runs = num_runs
+
+    def reset(self, runs: Runs) -> None:  # noqa: B027 - a response without a memory has nothing to forget
+        """Forget everything about these runs."""
+
+    @abstractmethod
+    def decide(self, epoch: Epoch, alarm: NDArray[bool_]) -> Decision:
+        """What becomes of this epoch's fix.
+
+        Args:
+            epoch: the present one.
+            alarm: whether any detector alarms, (N,).
+        """

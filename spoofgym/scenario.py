@@ -1,0 +1,268 @@
+"""What a game is played on: truth, sensors, filter settings and the stretch of time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from spoofgym.geodesy import position_difference
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.interface import Navigator, Timeline
+from spoofgym.navigation.linear import LinearNavigator, OwnCovarianceNavigator
+from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
+from spoofgym.navigation.loose import StrapdownNavigator
+from spoofgym.navigation.strapdown_model import strapdown_model
+from spoofgym.navigation.tuning import FilterTuning
+from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT, WarmStart, cold_start, warm_up
+from spoofgym.parallel import RunSlices
+from spoofgym.sensors.imu import ImuGrade
+from spoofgym.sensors.receiver import Receiver, draw_noise
+from spoofgym.streams import RunStreams
+from spoofgym.trajectory import Trajectory
+
+FIDELITIES = ("linear", "strapdown")
+
+
+class Scenario(ABC):
+    """What a simulation asks of a scenario.
+
+    Attributes:
+        name: the specification that builds it.
+        timeline: the epochs of the game.
+        dimension: m, of the fix.
+        drag_off_rate: the largest rate at which a spoofer moves the position, per axis (E, N, U), m/s.
+        error_scale: metres of navigation error that make a reward of 1.
+        fidelities: the valid ones.
+        matched: whether the filter's model is the truth, so that clean innovations are white.
+    """
+
+    name: str
+    timeline: Timeline
+    dimension: int
+    drag_off_rate: tuple[float, float, float]
+    error_scale: float
+    fidelities: tuple[str, ...] = FIDELITIES
+    matched: bool
+
+    @abstractmethod
+    def times(self, burn_in: int) -> Floats:
+        """Scenario time of the epochs -burn_in..K, s."""
+
+    @abstractmethod
+    def velocity(self) -> Floats:
+        """The true velocity at epochs 0..K, which a spoofer tracks, (K+1, 3), ENU, m/s."""
+
+    @abstractmethod
+    def track(self) -> Floats:
+        """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
+
+    @abstractmethod
+    def linear_model(self, burn_in: int = 0) -> LinearModel:
+        """The game in the linear fidelity, from epoch -burn_in on, every fix used: what a spoofer's shadow filter knows.
+
+        Raises:
+            ValueError: the scenario has no such model.
+        """
+
+    @abstractmethod
+    def navigator(
+        self, fidelity: str, excludes: bool, burn_in: int, num_runs: int, slices: RunSlices
+    ) -> Navigator:
+        """A navigator of ``num_runs`` runs whose model starts ``burn_in`` epochs before epoch 0.
+
+        Args:
+            fidelity: one of `fidelities`.
+            excludes: whether a fix can be left out, so that each run needs a covariance of its own.
+            burn_in: clean epochs before epoch 0.
+            num_runs: N.
+            slices: the threads to use.
+        """
+
+    @abstractmethod
+    def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
+        """Joint states of truth and filter just before epoch -burn_in, (n, 30)."""
+
+    @abstractmethod
+    def draw_receiver_noise(self, runs: Runs, initial: Floats, burn_in: int, streams: RunStreams) -> Floats:
+        """Receiver noise of the epochs -burn_in..K, (n, burn_in + K + 1, m), m and m/s."""
+
+    def check_fidelity(self, fidelity: str) -> None:
+        """Refuse a fidelity that the scenario does not have.
+
+        Raises:
+            ValueError: naming the valid ones.
+        """
+        if fidelity not in self.fidelities:
+            valid = ", ".join(self.fidelities)
+            raise ValueError(f"scenario {self.name!r} has no fidelity {fidelity!r}; valid fidelities: {valid}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulatedScenario(Scenario):
+    """A scenario with a known true trajectory.
+
+    Attributes:
+        name: the specification that builds it.
+        trajectory: the truth, at the IMU rate.
+        grade: of the IMU.
+        receiver: of the fixes.
+        tuning: what the filter believes.
+        onset: time of epoch 0, the last clean fix, s.
+        horizon: epochs of the game.
+        drag_off_rate: largest rate of the spoofed position per axis, m/s.
+        error_scale: metres of error that make a reward of 1.
+        true_position_random_walk: what really acts on the INS position, m/√s.
+    """
+
+    name: str
+    trajectory: Trajectory
+    grade: ImuGrade
+    receiver: Receiver
+    tuning: FilterTuning
+    onset: float
+    horizon: int
+    drag_off_rate: tuple[float, float, float]
+    error_scale: float
+    true_position_random_walk: float
+
+    def __post_init__(self) -> None:
+        if self.horizon < 1:
+            raise ValueError(f"horizon must be 1 epoch or more, got {self.horizon}")
+        first, last = 2 * self.receiver.interval, self.trajectory.time[-1] - self.horizon * self.receiver.interval
+        if not first <= self.onset <= last:
+            raise ValueError(
+                f"onset {self.onset:g} s with a horizon of {self.horizon} epochs does not fit the trajectory of "
+                f"{self.trajectory.time[-1]:g} s: valid from {first:g} to {last:g} s"
+            )
+        epoch = self.onset * self.receiver.rate
+        if abs(epoch - round(epoch)) > 1e-9:
+            raise ValueError(f"onset {self.onset:g} s is no epoch of a receiver at {self.receiver.rate:g} Hz")
+        if min(self.drag_off_rate) <= 0 or not self.error_scale > 0:
+            raise ValueError(
+                f"drag_off_rate and error_scale must be positive, got {self.drag_off_rate} and {self.error_scale}"
+            )
+        if len(self.tuning.measurement_sigma) != self.receiver.dimension:
+            raise ValueError(
+                f"the filter expects fixes of dimension {len(self.tuning.measurement_sigma)}, the receiver gives "
+                f"{self.receiver.dimension}"
+            )
+
+    @property
+    def timeline(self) -> Timeline:  # type: ignore[override]
+        """The epochs of the game."""
+        return Timeline(self.onset, self.receiver.interval, self.horizon)
+
+    @property
+    def dimension(self) -> int:  # type: ignore[override]
+        """m, of the fix."""
+        return self.receiver.dimension
+
+    @property
+    def matched(self) -> bool:  # type: ignore[override]
+        """Whether the noises that act are white and are those the filter believes in.
+
+        The initial covariance may still be over-stated; what is left of that after the warm-up shows only in states that the fixes hardly
+        observe.
+        """
+        return (
+            not any(self.receiver.markov_sigma)
+            and np.allclose(self.receiver.white_deviation, self.tuning.measurement_sigma, rtol=1e-12)
+            and not np.any(self.grade.instability_sigma)
+            and self.true_position_random_walk == self.tuning.position_random_walk
+            and self.tuning.process_noise_scale == 1.0
+        )
+
+    def times(self, burn_in: int) -> Floats:
+        """Scenario time of the epochs -burn_in..K, s."""
+        return self.onset + self.receiver.interval * np.arange(-burn_in, self.horizon + 1)
+
+    def velocity(self) -> Floats:
+        """The true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        return self.trajectory.velocity[np.round(self.times(0) * self.trajectory.rate).astype(int)]
+
+    def track(self) -> Floats:
+        """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
+        position = self.trajectory.position[np.round(self.times(0) * self.trajectory.rate).astype(int)]
+        return position_difference(position, position[0])
+
+    @cached_property
+    def _dynamics(self) -> ErrorDynamics:
+        """From the start of the trajectory to the end of the game."""
+        epochs = round(self.timeline.end * self.receiver.rate)
+        return error_dynamics(
+            self.trajectory, self.grade, self.receiver, self.tuning, self.true_position_random_walk, epochs
+        )
+
+    def _epochs(self, first: int, last: int) -> ErrorDynamics:
+        """Epochs first..last-1 of the trajectory, counted from 0 at its first fix."""
+        dynamics = self._dynamics
+        return ErrorDynamics(
+            dynamics.transition[first:last],
+            dynamics.process_noise[first:last],
+            dynamics.true_noise[first:last],
+            dynamics.observation[first:last],
+        )
+
+    @cache  # noqa: B019 - scenarios live as long as the program
+    def warm_start(self, burn_in: int = 0) -> WarmStart:
+        """Truth and filter just before epoch -burn_in.
+
+        Raises:
+            ValueError: the trajectory does not reach back that far.
+        """
+        before = round(self.onset * self.receiver.rate) - 1 - burn_in
+        if before < 0:
+            raise ValueError(f"scenario {self.name!r}: a burn-in of {burn_in} epochs reaches before the trajectory")
+        start = cold_start(self.grade, self.receiver, self.tuning)
+        return warm_up(start, self._epochs(0, before), self.grade, self.receiver, self.tuning)
+
+    @cache  # noqa: B019 - scenarios live as long as the program
+    def linear_model(self, burn_in: int = 0) -> LinearModel:
+        """The game in the linear fidelity, from epoch -burn_in on."""
+        first = round(self.onset * self.receiver.rate) - 1 - burn_in
+        timeline = Timeline(
+            self.onset - burn_in * self.receiver.interval, self.receiver.interval, self.horizon + burn_in
+        )
+        dynamics = self._epochs(first, first + timeline.num_epochs + 1)
+        return linear_model(dynamics, self.warm_start(burn_in).filter_covariance, self.tuning, timeline)
+
+    def navigator(
+        self, fidelity: str, excludes: bool, burn_in: int, num_runs: int, slices: RunSlices
+    ) -> Navigator:
+        """A navigator whose model starts ``burn_in`` epochs before epoch 0; arguments as in `Scenario`."""
+        self.check_fidelity(fidelity)
+        if fidelity == "linear":
+            kind = OwnCovarianceNavigator if excludes else LinearNavigator
+            return kind(self.linear_model(burn_in), self.grade, self.receiver.interval, num_runs, slices)
+        model = strapdown_model(
+            self.trajectory,
+            self.grade,
+            self.receiver,
+            self.tuning,
+            self.true_position_random_walk,
+            self.warm_start(burn_in).filter_covariance,
+            Timeline(self.times(burn_in)[0], self.receiver.interval, self.horizon + burn_in),
+        )
+        return StrapdownNavigator(model, num_runs, slices)
+
+    def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
+        """Joint states of truth and filter just before epoch -burn_in, (n, 30)."""
+        factor = self.warm_start(burn_in).joint_factor
+        normals = np.empty((len(runs), NUM_JOINT))
+        for place, run in enumerate(runs):
+            streams(run, "initial").standard_normal(out=normals[place])
+        initial = np.zeros((len(runs), NUM_JOINT))
+        for j in range(NUM_JOINT):
+            initial += normals[:, j, None] * factor[:, j]
+        return initial
+
+    def draw_receiver_noise(self, runs: Runs, initial: Floats, burn_in: int, streams: RunStreams) -> Floats:
+        """Receiver noise of the epochs -burn_in..K, (n, burn_in + K + 1, m), m and m/s."""
+        epochs = burn_in + self.horizon + 1
+        noise = np.empty((len(runs), epochs, self.dimension))
+        for place, run in enumerate(runs):
+            noise[place] = draw_noise(self.receiver, epochs, streams(run, "receiver"), initial[place, COLOUR])
+        return noise

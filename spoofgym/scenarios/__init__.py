@@ -1,0 +1,26 @@
+"""Named set-ups: one file per paper, recorded logs, our own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios.liu_flight import liu_flight
+from spoofgym.specification import build
+
+SCENARIOS: dict[str, Callable[..., Scenario]] = {"liu-flight": liu_flight}
+
+
+@lru_cache(maxsize=32)
+def _build(text: str) -> Scenario:
+    return build(text, SCENARIOS, "scenario")
+
+
+def make_scenario(scenario: str | Scenario) -> Scenario:
+    """The scenario that a specification names; an object is returned as it is.
+
+    Raises:
+        ValueError: unknown name or option, or a value that does not fit; the message lists the valid ones.
+    """
+    return scenario if isinstance(scenario, Scenario) else _build(scenario)

@@ -1,0 +1,112 @@
+"""The flight of Liu et al. (2018): 1100 s near Xi'an, 100 Hz.
+
+The paper gives the trajectory as a figure only. Speed, height, the times and angles of the turns and the end follow it; the
+shapes of the manoeuvres are ours.
+"""
+
+from __future__ import annotations
+
+import math
+
+from functools import lru_cache
+
+import numpy as np
+
+from spoofgym.geodesy import displace, position_difference
+from spoofgym.navigation.tuning import FilterTuning
+from spoofgym.scenario import SimulatedScenario
+from spoofgym.sensors.imu import grade
+from spoofgym.sensors.receiver import Receiver
+from spoofgym.specification import Specification
+from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly
+
+LIU_END = (math.radians(34.6887), math.radians(108.1915), 2283.0)
+"""End of the flight: latitude rad, longitude rad, height m."""
+
+LIU_MANOEUVRES = (
+    Straight(20.0),
+    Accelerate(50.0, 60.0),
+    Climb(700.0, 70.0),
+    Turn(math.radians(-90.0), 90.0),
+    Climb(800.0, 90.0),
+    Turn(math.radians(90.0), 90.0),
+    Straight(60.0),
+    Turn(math.radians(-180.0), 180.0),
+    Straight(20.0),
+    Turn(math.radians(90.0), 90.0),
+    Straight(330.0),
+)
+"""Turns begin at 150, 330, 480 and 680 s; from 770 s straight and level, north at 150 m/s."""
+
+
+def liu_trajectory() -> Trajectory:
+    """True motion of the Liu flight: 100 to 150 m/s, 783 to 2283 m, turns of -90, +90, -180 and +90 degrees.
+
+    It is flown twice: the start of the second flight is moved by what the first one missed the end by.
+
+    Returns:
+        110,000 IMU steps at 100 Hz.
+    """
+    start = np.array([LIU_END[0], LIU_END[1], 783.0])
+    for _ in range(3):
+        flight = fly(LIU_MANOEUVRES, position=start, speed=100.0, heading=math.radians(90.0))
+        miss = position_difference(LIU_END, flight.position[-1])
+        if np.linalg.norm(miss) < 1e-3:
+            break
+        start = displace(start, miss)
+    return flight
+
+
+@lru_cache(maxsize=1)
+def _trajectory() -> Trajectory:
+    return liu_trajectory()
+
+
+def liu_flight(
+    horizon: int = 120,
+    onset: float = 800.0,
+    rate: float = 1.0,
+    imu: str = "navigation",
+    markov_sigma: float = 0.0,
+    markov_time: float = 0.0,
+) -> SimulatedScenario:
+    """The Liu flight: aviation-grade INS, single-frequency GPS whose white noise has the filter's own R.
+
+    Settings of the filter: Liu 2018, table 1 and appendix D. The position random walk that the filter believes in (1 m/√h) really acts on
+    the INS, so that the filter is matched. Liu's range errors are of a later scenario; here R is white.
+
+    Args:
+        horizon: epochs of the game.
+        onset: time of the last clean fix, s.
+        rate: of the fixes, Hz.
+        imu: name of the IMU grade.
+        markov_sigma: first-order Gauss-Markov receiver noise in the horizontal axes, m; the vertical has R's ratio; unknown to the filter.
+        markov_time: its correlation time, s.
+    """
+    sigma = (3.7, 3.7, 6.0)
+    options = {
+        "horizon": (horizon, 120),
+        "onset": (onset, 800.0),
+        "rate": (rate, 1.0),
+        "imu": (imu, "navigation"),
+        "markov_sigma": (markov_sigma, 0.0),
+        "markov_time": (markov_time, 0.0),
+    }
+    given = {key: f"{value:g}" if isinstance(value, float) else str(value) for key, (value, default) in options.items() if value != default}
+    return SimulatedScenario(
+        name=str(Specification("liu-flight", None, given)),
+        trajectory=_trajectory(),
+        grade=grade(imu),
+        receiver=Receiver(
+            rate=rate,
+            white_sigma=sigma,
+            markov_sigma=(markov_sigma, markov_sigma, markov_sigma * sigma[2] / sigma[0]),
+            markov_time=markov_time,
+        ),
+        tuning=FilterTuning(measurement_sigma=sigma),
+        onset=onset,
+        horizon=horizon,
+        drag_off_rate=(4.0, 4.0, 4.0),
+        error_scale=10.0,
+        true_position_random_walk=FilterTuning().position_random_walk,
+    )

@@ -1,0 +1,1 @@
+"""What measures the motion: inertial units, receivers, odometers, satellites."""

@@ -1,0 +1,193 @@
+"""IMU grades by their data sheets, and the error processes of an inertial sensor.
+
+The error of each axis is a constant bias, a first-order Gauss-Markov bias instability and white noise (Groves 2013, section 4.4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from spoofgym import validation
+from spoofgym.arrays import Floats
+
+DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
+DEGREE_PER_ROOT_HOUR = math.pi / 180.0 / 60.0
+MICRO_G = 9.80665e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuGrade:
+    """The errors of an IMU in the units of its data sheet, one sigma, the same on every axis.
+
+    Attributes:
+        name: of the grade.
+        gyro_bias: constant bias, deg/h.
+        gyro_random_walk: angular random walk, deg/√h.
+        gyro_instability: bias instability, deg/h.
+        accelerometer_bias: constant bias, µg.
+        accelerometer_random_walk: velocity random walk, µg/√Hz.
+        accelerometer_instability: bias instability, µg.
+        correlation_time: of both instabilities, s.
+        source: where the figures come from.
+    """
+
+    name: str
+    gyro_bias: float
+    gyro_random_walk: float
+    gyro_instability: float
+    accelerometer_bias: float
+    accelerometer_random_walk: float
+    accelerometer_instability: float
+    correlation_time: float
+    source: str
+
+    def __post_init__(self) -> None:
+        for item in (
+            "gyro_bias",
+            "gyro_random_walk",
+            "gyro_instability",
+            "accelerometer_bias",
+            "accelerometer_random_walk",
+            "accelerometer_instability",
+        ):
+            validation.non_negative(f"IMU grade {self.name!r}", item, getattr(self, item))
+        validation.above(f"IMU grade {self.name!r}", "correlation_time", self.correlation_time)
+
+    @property
+    def noise_density(self) -> Floats:
+        """White noise of gyro and accelerometer axes, (6,), rad/√s and m/s²/√Hz."""
+        gyro, accelerometer = self.gyro_random_walk * DEGREE_PER_ROOT_HOUR, self.accelerometer_random_walk * MICRO_G
+        return np.repeat([gyro, accelerometer], 3)
+
+    @property
+    def bias_sigma(self) -> Floats:
+        """Constant biases, (6,), rad/s and m/s²."""
+        return np.repeat([self.gyro_bias * DEGREE_PER_HOUR, self.accelerometer_bias * MICRO_G], 3)
+
+    @property
+    def instability_sigma(self) -> Floats:
+        """Stationary sigma of the bias instability, (6,), rad/s and m/s²."""
+        return np.repeat([self.gyro_instability * DEGREE_PER_HOUR, self.accelerometer_instability * MICRO_G], 3)
+
+
+GRADES = {
+    item.name: item
+    for item in (
+        ImuGrade(
+            name="navigation",
+            gyro_bias=0.01,
+            gyro_random_walk=0.005,
+            gyro_instability=0.0,
+            accelerometer_bias=100.0,
+            accelerometer_random_walk=20.0,
+            accelerometer_instability=0.0,
+            correlation_time=3600.0,
+            source="Liu et al. 2018, table 1 (aviation-grade INS)",
+        ),
+        ImuGrade(
+            name="tactical",
+            gyro_bias=1.0,
+            gyro_random_walk=0.1,
+            gyro_instability=0.3,
+            accelerometer_bias=1000.0,
+            accelerometer_random_walk=100.0,
+            accelerometer_instability=50.0,
+            correlation_time=300.0,
+            source="fibre-optic and quartz tactical class, e.g. Honeywell HG1700 data sheet: 1 deg/h, 0.125 deg/√h, 1 mg",
+        ),
+        ImuGrade(
+            name="industrial",
+            gyro_bias=10.0,
+            gyro_random_walk=0.3,
+            gyro_instability=3.0,
+            accelerometer_bias=2000.0,
+            accelerometer_random_walk=200.0,
+            accelerometer_instability=50.0,
+            correlation_time=300.0,
+            source="calibrated MEMS class, e.g. Analog Devices ADIS16488 data sheet: 5 deg/h instability, 0.3 deg/√h",
+        ),
+        ImuGrade(
+            name="automotive",
+            gyro_bias=720.0,
+            gyro_random_walk=0.6,
+            gyro_instability=20.0,
+            accelerometer_bias=40000.0,
+            accelerometer_random_walk=300.0,
+            accelerometer_instability=200.0,
+            correlation_time=300.0,
+            source="consumer MEMS class, e.g. Bosch BMI088 and TDK ICM-20602 data sheets: 0.2 deg/s and 40 mg offsets",
+        ),
+    )
+}
+
+
+def grade(name: str) -> ImuGrade:
+    """The grade of this name.
+
+    Raises:
+        ValueError: unknown; the message lists the valid names.
+    """
+    if name not in GRADES:
+        raise ValueError(f"unknown IMU grade {name!r}; valid grades: {', '.join(GRADES)}")
+    return GRADES[name]
+
+
+@njit(cache=True, nogil=True)
+def gauss_markov_step(value: float, sigma: float, decay: float, normal: float) -> float:
+    """One step of a first-order Gauss-Markov process: x <- a x + σ √(1 - a²) n, with a = exp(-Δt / τ)."""
+    return decay * value + sigma * math.sqrt(1.0 - decay * decay) * normal
+
+
+@njit(cache=True, nogil=True)
+def white_sample(density: float, step: float, normal: float) -> float:
+    """White noise averaged over a sample: density / √Δt times a standard normal."""
+    return density / math.sqrt(step) * normal
+
+
+def simulate(imu: ImuGrade, num_samples: int, step: float, interval: float, rng: np.random.Generator) -> Floats:
+    """Errors of gyro and accelerometer axes, as the navigators apply them: the instability is held over each interval.
+
+    Args:
+        imu: the grade.
+        num_samples: n.
+        step: between samples, s.
+        interval: after which the bias instability moves, s.
+        rng: source of randomness.
+
+    Returns:
+        (n, 6), rad/s and m/s².
+    """
+    held = max(1, round(interval / step))
+    decay = math.exp(-held * step / imu.correlation_time)
+    bias = imu.bias_sigma * rng.standard_normal(6)
+    instability = imu.instability_sigma * rng.standard_normal(6)
+    driving = rng.standard_normal((-(-num_samples // held), 6))
+    white = rng.standard_normal((num_samples, 6))
+    errors = np.empty((num_samples, 6))
+    _fill(errors, bias, instability, driving, white, imu.instability_sigma, imu.noise_density, decay, step, held)
+    return errors
+
+
+@njit(cache=True, nogil=True)
+def _fill(
+    errors: Floats,
+    bias: Floats,
+    instability: Floats,
+    driving: Floats,
+    white: Floats,
+    sigma: Floats,
+    density: Floats,
+    decay: float,
+    step: float,
+    held: int,
+) -> None:
+    for i in range(errors.shape[0]):
+        if i > 0 and i % held == 0:
+            for a in range(6):
+                instability[a] = gauss_markov_step(instability[a], sigma[a], decay, driving[i // held, a])
+        for a in range(6):
+            errors[i, a] = bias[a] + instability[a] + white_sample(density[a], step, white[i, a])

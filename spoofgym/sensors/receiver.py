@@ -1,0 +1,112 @@
+"""GNSS fixes: their rate, their noise, and where and when they are taken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from spoofgym import validation
+from spoofgym.arrays import Floats
+
+Triple = tuple[float, float, float]
+ZERO: Triple = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Receiver:
+    """A receiver of position fixes, and of velocity where ``velocity_sigma`` is given.
+
+    Attributes:
+        rate: of the fixes, Hz.
+        white_sigma: white noise of the position (E, N, U), 1 sigma, m.
+        markov_sigma: first-order Gauss-Markov noise of the position (E, N, U), stationary sigma, m.
+        markov_time: its correlation time, s.
+        velocity_sigma: white noise of the velocity (E, N, U), m/s; None = the receiver gives position only.
+        latency: age of a fix at its epoch, s; less than the interval between fixes.
+        lever_arm: of the antenna from the IMU, body R, F, U, m. The velocity is referred to the IMU.
+    """
+
+    rate: float = 1.0
+    white_sigma: Triple = (3.7, 3.7, 6.0)
+    markov_sigma: Triple = ZERO
+    markov_time: float = 0.0
+    velocity_sigma: Triple | None = None
+    latency: float = 0.0
+    lever_arm: Triple = ZERO
+
+    def __post_init__(self) -> None:
+        validation.above("receiver", "rate", self.rate)
+        for name in ("white_sigma", "markov_sigma", "velocity_sigma"):
+            values = getattr(self, name)
+            if name == "velocity_sigma" and values is None:
+                continue
+            if len(values) != 3:
+                raise ValueError(f"receiver: {name} must be three numbers (E, N, U), got {values!r}")
+            for value in values:
+                validation.non_negative("receiver", name, value)
+        if any(self.markov_sigma):
+            validation.above("receiver", "markov_time", self.markov_time)
+        elif self.markov_time != 0.0:
+            raise ValueError(f"receiver: markov_time {self.markov_time!r} needs a markov_sigma beside it")
+        validation.non_negative("receiver", "latency", self.latency)
+        if self.latency >= self.interval:
+            raise ValueError(
+                f"receiver: latency must be less than the interval of {self.interval:g} s, got {self.latency!r}"
+            )
+        for value in self.lever_arm:
+            validation.finite("receiver", "lever_arm", value)
+
+    @property
+    def interval(self) -> float:
+        """Time between fixes, s."""
+        return 1.0 / self.rate
+
+    @property
+    def dimension(self) -> int:
+        """m: 3 for position, 6 with velocity."""
+        return 3 if self.velocity_sigma is None else 6
+
+    @property
+    def white_deviation(self) -> Floats:
+        """White noise of the fix, (m,), m and m/s."""
+        return np.array([*self.white_sigma, *(self.velocity_sigma or ())], dtype=np.float64)
+
+    def samples_per_fix(self, imu_rate: float) -> int:
+        """IMU samples between fixes.
+
+        Raises:
+            ValueError: the rate of the IMU is no multiple of the fixes', or the latency no multiple of a sample.
+        """
+        ratio = imu_rate / self.rate
+        if ratio < 1 or abs(ratio - round(ratio)) > 1e-9:
+            raise ValueError(
+                f"receiver: rate {self.rate:g} Hz must divide the IMU's {imu_rate:g} Hz into whole samples"
+            )
+        late = self.latency * imu_rate
+        if abs(late - round(late)) > 1e-6:
+            raise ValueError(f"receiver: latency {self.latency:g} s must be a multiple of {1 / imu_rate:g} s")
+        return round(ratio)
+
+
+def draw_noise(receiver: Receiver, num_epochs: int, rng: np.random.Generator, before: Floats) -> Floats:
+    """Noise of consecutive fixes: a Gauss-Markov part, then a white part, drawn only where they exist.
+
+    Args:
+        receiver: whose noise.
+        num_epochs: E.
+        rng: source of randomness.
+        before: value of the Gauss-Markov part one interval before the first fix, (3,), m.
+
+    Returns:
+        (E, m), m and m/s.
+    """
+    noise = np.zeros((num_epochs, receiver.dimension))
+    if any(receiver.markov_sigma):
+        decay = np.exp(-receiver.interval / receiver.markov_time)
+        driving = np.sqrt(1.0 - decay**2) * np.array(receiver.markov_sigma) * rng.standard_normal((num_epochs, 3))
+        noise[:, :3], _ = lfilter([1.0], [1.0, -decay], driving, axis=0, zi=(decay * before)[None, :])
+    if receiver.white_deviation.any():
+        noise += receiver.white_deviation * rng.standard_normal(noise.shape)
+    return noise

@@ -1,0 +1,258 @@
+"""N runs of a scenario, one GNSS epoch at a time: trajectory, sensors, attack, navigation, detectors, response."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spoofgym.attacks.base import Attack
+from spoofgym.detectors.base import Detector
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.interface import Clock, Decision, Epoch, Innovation
+from spoofgym.parallel import RunSlices
+from spoofgym.responses.base import Response
+from spoofgym.scenario import Scenario
+from spoofgym.streams import RunStreams
+
+MAX_REDRAWS = 100
+
+
+class Simulation:
+    """The whole loop: `reset`, then `resolve` and `observe` in turn.
+
+    Attributes:
+        scenario: what is simulated.
+        detectors: by their names, in order.
+        navigator: the N filters.
+        epoch: the present epoch of every run, as `observe` left it.
+        alarm: whether any detector alarms in the present epoch, (N,).
+        offset: what the spoofer added to the present fix, (N, 3), m ENU.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        attack: Attack | None = None,
+        detectors: Sequence[Detector] = (),
+        response: Response | None = None,
+        num_runs: int = 1,
+        seed: int | None = None,
+        *,
+        fidelity: str = "linear",
+        threads: int = 1,
+    ) -> None:
+        """Set up ``num_runs`` runs seeded ``seed + i``.
+
+        Args:
+            scenario: what is simulated.
+            attack: adds offsets by itself; None = the caller gives them to `observe`.
+            detectors: each with its threshold set.
+            response: decides in `resolve` where the caller does not; None = use every fix.
+            num_runs: N.
+            seed: of run 0; None = fresh entropy.
+            fidelity: "linear" or "strapdown".
+            threads: for slices of runs.
+
+        Raises:
+            ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the game.
+        """
+        if num_runs < 1:
+            raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
+        scenario.check_fidelity(fidelity)
+        self.scenario = scenario
+        self.num_runs = num_runs
+        self.streams = RunStreams.from_seed(seed, num_runs)
+        for detector in detectors:
+            detector.bind(num_runs, scenario.dimension)
+            if detector.threshold is None:
+                raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
+        self.detectors = {detector.name: detector for detector in detectors}
+        self.attack = attack
+        if attack is not None:
+            attack.bind(scenario.timeline, num_runs)
+        self.response = response
+        if response is not None:
+            response.bind(num_runs)
+        memory = max((detector.memory for detector in detectors), default=0)
+        self._white_memory = memory if scenario.matched else 0
+        self.burn_in = 0 if scenario.matched else memory
+        excludes = response is not None and response.excludes
+        self.navigator = scenario.navigator(fidelity, excludes, self.burn_in, num_runs, RunSlices(threads))
+        self._times = scenario.times(self.burn_in)
+        self._noise = np.zeros((num_runs, len(self._times), scenario.dimension))
+        self._all = np.arange(num_runs)
+        self._decision = Decision(np.ones(num_runs, dtype=bool))
+        self._no_offset = np.zeros((num_runs, 3))
+        self.offset = self._no_offset.copy()
+        self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
+        self.epoch = self._blank_epoch()
+
+    def _blank_epoch(self) -> Epoch:
+        n, m = self.num_runs, self.scenario.dimension
+        innovation = Innovation(np.zeros((n, m)), np.zeros((n, m, m)), np.zeros((n, m)), np.zeros(n))
+        statistics = {name: np.zeros(n) for name in self.detectors}
+        return Epoch(np.zeros(n, dtype=np.int64), np.zeros(n), innovation, statistics)
+
+    @property
+    def error(self) -> Floats:
+        """Estimate minus truth, (N, 3), m ENU; never known to any player."""
+        return self.navigator.error
+
+    def reset(self, runs: Runs | None = None) -> Epoch:
+        """Start new episodes of runs (all by default), up to and including the clean epoch 0."""
+        runs = self._all if runs is None else np.asarray(runs, dtype=np.int64)
+        if len(runs):
+            bank = self._warm(runs)
+            epoch = self._clean_epoch(runs)
+            self.alarm[runs] = self._test(epoch, bank)
+            self._merge(runs, epoch)
+            self._remember(runs, bank)
+            self._decide()
+        return self.epoch
+
+    def restart(self, runs: Runs) -> None:
+        """Start new episodes of runs just before their epoch 0, which the next `observe` brings, without an offset."""
+        if len(runs):
+            self._remember(runs, self._warm(runs))
+
+    def _remember(self, runs: Runs, bank: dict[str, Detector]) -> None:
+        for name, detector in self.detectors.items():
+            detector.take(runs, bank[name])
+
+    def _warm(self, runs: Runs) -> dict[str, Detector]:
+        """New episodes just before epoch 0, and detectors of these runs alone that have seen a clean burn-in without an alarm."""
+        bank = {name: copy.copy(detector) for name, detector in self.detectors.items()}
+        for detector in bank.values():
+            detector.bind(len(runs), self.scenario.dimension)
+        self.offset[runs] = 0.0
+        if self.attack is not None:
+            self.attack.reset(runs, self.streams)
+        if self.response is not None:
+            self.response.reset(runs)
+        pending = np.arange(len(runs))
+        for _ in range(MAX_REDRAWS):
+            pending = pending[self._burn_in(runs[pending], pending, bank)]
+            if len(pending) == 0:
+                return bank
+        raise RuntimeError(f"{len(pending)} runs alarm in every clean burn-in: the thresholds are far too low")
+
+    def _burn_in(self, runs: Runs, places: Runs, bank: dict[str, Detector]) -> NDArray[np.bool_]:
+        """One try of some runs at the burn-in; whether each alarmed in it, (n,)."""
+        part = {name: copy.copy(detector) for name, detector in bank.items()}
+        for detector in part.values():
+            detector.bind(len(runs), self.scenario.dimension)
+        initial = self.scenario.draw_initial(runs, self.burn_in, self.streams)
+        self._noise[runs] = self.scenario.draw_receiver_noise(runs, initial, self.burn_in, self.streams)
+        self.navigator.reset(runs, initial, self.streams)
+        alarmed = np.zeros(len(runs), dtype=bool)
+        for epoch in self._white_epochs(runs):
+            alarmed |= self._test(epoch, part)
+        use = Decision(np.ones(len(runs), dtype=bool))
+        for _ in range(self.burn_in):
+            alarmed |= self._test(self._clean_epoch(runs), part)
+            self.navigator.resolve(use, runs)
+        for name, detector in bank.items():
+            detector.take(places, part[name])
+        return alarmed
+
+    def _clean_epoch(self, runs: Runs) -> Epoch:
+        """Carry some runs to their next epoch, without an offset."""
+        self.navigator.propagate(runs)
+        index = self.navigator.index[runs]
+        innovation = self.navigator.innovate(self._noise[runs, index], runs)
+        return Epoch(index - self.burn_in, self._times[index], innovation)
+
+    def _white_epochs(self, runs: Runs) -> list[Epoch]:
+        """Innovations of a matched filter before epoch 0, which are independent of its state: drawn directly."""
+        m, memory = self.scenario.dimension, self._white_memory
+        if memory == 0:
+            return []
+        whitened = np.stack([self.streams(run, "memory").standard_normal((memory, m)) for run in runs])
+        factor = self.scenario.linear_model().innovation_factor[0]
+        covariance = np.broadcast_to(self.scenario.linear_model().innovation_covariance[0], (len(runs), m, m))
+        epochs = []
+        for k in range(memory):
+            index = np.full(len(runs), k - memory)
+            residual, nis = np.zeros((len(runs), m)), np.zeros(len(runs))
+            for j in range(m):
+                residual += whitened[:, k, j, None] * factor[:, j]
+                nis += whitened[:, k, j] ** 2
+            time = self.scenario.timeline.start + index * self.scenario.timeline.interval
+            epochs.append(Epoch(index, time, Innovation(residual, covariance, whitened[:, k].copy(), nis)))
+        return epochs
+
+    def _test(self, epoch: Epoch, detectors: dict[str, Detector]) -> NDArray[np.bool_]:
+        """Let the detectors see an epoch, in order; whether any alarms, (n,)."""
+        alarm = np.zeros(len(epoch.index), dtype=bool)
+        for name, detector in detectors.items():
+            statistic = detector.update(epoch)
+            epoch.statistics[name] = statistic
+            alarm |= statistic > detector.threshold
+        return alarm
+
+    def _merge(self, runs: Runs, part: Epoch) -> None:
+        """Put the epoch of some runs beside that of the others."""
+        if len(runs) == self.num_runs:
+            self.epoch = part
+            return
+        whole, innovation = self.epoch, self.epoch.innovation
+        pairs = [
+            (whole.index, part.index),
+            (whole.time, part.time),
+            (innovation.residual, part.innovation.residual),
+            (innovation.covariance, part.innovation.covariance),
+            (innovation.whitened, part.innovation.whitened),
+            (innovation.nis, part.innovation.nis),
+        ]
+        pairs += [(whole.statistics[name], statistic) for name, statistic in part.statistics.items()]
+        for target, source in pairs:
+            target[runs] = source
+
+    def resolve(self, decision: Decision | None = None, runs: Runs | None = None) -> None:
+        """Second half of the present epoch of runs (all by default): use the fix or leave it out.
+
+        Args:
+            decision: of a defender outside, for these runs; None = the response's, or to use every fix where there is none.
+            runs: which.
+        """
+        if decision is None:
+            decision = self._decision
+            if runs is not None:
+                decision = Decision(decision.use[runs])
+        self.navigator.resolve(decision, runs)
+
+    def observe(self, offset: Floats | None = None) -> Epoch:
+        """First half of the next epoch of every run: propagate, measure, form the innovation and the statistics.
+
+        Args:
+            offset: of the spoofer, (N, 3), m ENU; None = the attack's, or none where there is no attack.
+
+        Raises:
+            RuntimeError: a run has no epoch left.
+        """
+        navigator = self.navigator
+        if navigator.index.max() + 1 >= len(self._times):
+            raise RuntimeError(f"run {int(navigator.index.argmax())} has reached its last epoch: reset it")
+        following = navigator.index + 1
+        clock = Clock(following - self.burn_in, self._times[following])
+        if offset is None:
+            offset = self._no_offset if self.attack is None else self.attack.offset(clock)
+        deviation = self._noise[self._all, following]
+        deviation[:, :3] += offset
+        if self.scenario.dimension == 6:
+            deviation[:, 3:] += (offset - self.offset) / self.scenario.timeline.interval
+        self.offset = np.array(offset, dtype=np.float64)
+        navigator.propagate()
+        epoch = Epoch(clock.index, clock.time, navigator.innovate(deviation))
+        self.alarm = self._test(epoch, self.detectors)
+        self.epoch = epoch
+        self._decide()
+        return epoch
+
+    def _decide(self) -> None:
+        """The response sees each epoch once."""
+        if self.response is not None:
+            self._decision = self.response.decide(self.epoch, self.alarm)

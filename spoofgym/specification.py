@@ -1,0 +1,155 @@
+"""The one spelling of a part: ``name[:value][,key=value...]``.
+
+Command line, environment arguments, opponent pools, tables and files all name a detector, an attack, a response or a scenario this
+way: ``snapshot``, ``windowed:n=20,arl0=1e5``, ``ramp:0.5,direction=135``, ``recorded:PATH,grade=tactical``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import types
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class Specification:
+    """A parsed specification.
+
+    Attributes:
+        name: the part's registered name.
+        value: the positional value after the colon, if any.
+        options: the ``key=value`` pairs in the order written.
+    """
+
+    name: str
+    value: str | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def parse(cls, text: str) -> Specification:
+        """Read ``name[:value][,key=value...]``; blanks around a piece do not count.
+
+        Raises:
+            ValueError: empty name or piece, a key given twice, or a piece that is neither the first value nor ``key=value``.
+        """
+        name, separator, rest = text.strip().partition(":")
+        if "," in name:
+            name, separator, rest = text.strip().partition(",")
+        name = name.rstrip()
+        if not name or "=" in name:
+            raise ValueError(f"specification {text!r}: expected name[:value][,key=value...]")
+        value: str | None = None
+        options: dict[str, str] = {}
+        pieces = [piece.strip() for piece in rest.split(",")] if separator else []
+        for position, piece in enumerate(pieces):
+            key, equals, content = (part.strip() for part in piece.partition("="))
+            if not equals and position == 0 and separator == ":" and piece:
+                value = piece
+            elif not equals or not key or not content:
+                raise ValueError(f"specification {text!r}: {piece!r} is not key=value")
+            elif key in options:
+                raise ValueError(f"specification {text!r}: {key!r} is given twice")
+            else:
+                options[key] = content
+        return cls(name, value, options)
+
+    def __str__(self) -> str:
+        pieces = ([] if self.value is None else [self.value]) + [f"{key}={value}" for key, value in self.options.items()]
+        return self.name + (":" + ",".join(pieces) if pieces else "")
+
+
+def spell(name: str, value: object = None, **options: object) -> str:
+    """Write the specification of a part from Python values; None is left out.
+
+    Numbers are written as shortly as they can be read back exactly: 1e5 as ``100000``, 0.5 as ``0.5``.
+    """
+    written = {key: _write(content) for key, content in options.items() if content is not None}
+    return str(Specification(name, None if value is None else _write(value), written))
+
+
+def _write(content: object) -> str:
+    if isinstance(content, bool):
+        return str(content).lower()
+    if isinstance(content, float):
+        short = f"{content:g}"
+        return short if float(short) == content else repr(float(content))
+    return str(content)
+
+
+def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> Part:
+    """Make the part that a specification names.
+
+    The value fills the factory's first parameter, options fill the others by name; strings are converted by the parameter's annotation
+    (``float``, ``int``, ``bool``, ``str``, or one of them ``| None``).
+
+    Args:
+        text: the specification.
+        registry: factory (class or function) of every known name.
+        kind: what is built, for error messages ("detector", "attack", ...).
+
+    Raises:
+        ValueError: unknown name or option (the message lists the valid ones), or a value of the wrong type.
+    """
+    specification = Specification.parse(text)
+    if specification.name not in registry:
+        raise ValueError(f"unknown {kind} {specification.name!r}; valid names: {', '.join(sorted(registry))}")
+    factory = registry[specification.name]
+    parameters = inspect.signature(factory).parameters
+    hints = typing.get_type_hints(factory.__init__ if inspect.isclass(factory) else factory)
+    arguments = dict(specification.options)
+    if specification.value is not None:
+        if not parameters:
+            raise ValueError(f"{kind} {specification.name!r} takes no value, got {specification.value!r}")
+        first = next(iter(parameters))
+        if first in arguments:
+            raise ValueError(f"{kind} {text!r}: {first!r} is given twice")
+        arguments[first] = specification.value
+    unknown = [key for key in arguments if key not in parameters]
+    if unknown:
+        valid = ", ".join(parameters) or "none"
+        raise ValueError(f"{kind} {specification.name!r} has no option {unknown[0]!r}; valid options: {valid}")
+    missing = [p.name for p in parameters.values() if p.default is inspect.Parameter.empty and p.name not in arguments]
+    if missing:
+        raise ValueError(f"{kind} {specification.name!r} needs {missing[0]!r}, e.g. {specification.name}:{missing[0]}=...")
+    return factory(**{key: _convert(text, key, value, hints.get(key, str)) for key, value in arguments.items()})
+
+
+def part_of(spec_or_object: object, registry: Mapping[str, Callable[..., Part]], kind: str, base: type) -> Part:
+    """The part itself if it is one already, else the part that the specification names.
+
+    Raises:
+        ValueError: as `build`.
+        TypeError: neither a specification nor an instance of ``base``.
+    """
+    if isinstance(spec_or_object, base):
+        return spec_or_object
+    if isinstance(spec_or_object, str):
+        return build(spec_or_object, registry, kind)
+    raise TypeError(
+        f"{kind} must be a specification (one of {', '.join(sorted(registry))}, with options) or a {base.__name__}, "
+        f"got {spec_or_object!r}"
+    )
+
+
+def _convert(text: str, key: str, value: str, annotation: Any) -> Any:
+    union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
+    choices = typing.get_args(annotation) if union else (annotation,)
+    if bool in choices:
+        if value.lower() not in ("true", "false"):
+            raise ValueError(f"{text!r}: {key} must be true or false, got {value!r}")
+        return value.lower() == "true"
+    for kind in (int, float):
+        if kind in choices:
+            try:
+                return kind(value)
+            except ValueError:
+                continue
+    if str in choices:
+        return value
+    wanted = " or ".join(choice.__name__ for choice in choices if choice is not type(None))
+    raise ValueError(f"{text!r}: {key} must be {wanted}, got {value!r}")

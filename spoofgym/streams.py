@@ -1,0 +1,65 @@
+"""Random streams: one generator per run and purpose.
+
+Run i of a batch draws from children of its own generator only, so that it is bit-identical for any number of runs and threads. The
+purposes are separate streams and every episode takes blocks of a fixed size from them, so that two attackers on the same seed meet
+the same noise, in this episode and in the later ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory")
+
+
+class RunStreams:
+    """The generators of a batch of runs, made when first asked for.
+
+    A child depends on its parent's seed sequence and its purpose alone, never on the order in which children are asked for.
+    """
+
+    def __init__(self, parents: Sequence[np.random.Generator]) -> None:
+        """Keep the runs' own generators, in order."""
+        self._parents = list(parents)
+        self._children: dict[tuple[int, str], np.random.Generator] = {}
+
+    @classmethod
+    def from_seed(cls, seed: int | None, num_runs: int) -> RunStreams:
+        """Streams of runs seeded ``seed + i``, as Gymnasium seeds the lanes of a vector environment.
+
+        Raises:
+            ValueError: the seed is negative, or there is no run.
+        """
+        if seed is not None and seed < 0:
+            raise ValueError(f"seed must be a non-negative integer or None, got {seed}")
+        if num_runs < 1:
+            raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
+        seeds = [None] * num_runs if seed is None else [seed + i for i in range(num_runs)]
+        return cls([np.random.Generator(np.random.PCG64(np.random.SeedSequence(s))) for s in seeds])
+
+    def __len__(self) -> int:
+        return len(self._parents)
+
+    def replace(self, run: int, parent: np.random.Generator) -> None:
+        """Give a run a new generator; its children start anew."""
+        self._parents[run] = parent
+        for purpose in PURPOSES:
+            self._children.pop((run, purpose), None)
+
+    def __call__(self, run: int, purpose: str) -> np.random.Generator:
+        """The generator of one run for one purpose.
+
+        Raises:
+            ValueError: unknown purpose.
+        """
+        child = self._children.get((run, purpose))
+        if child is None:
+            if purpose not in PURPOSES:
+                raise ValueError(f"unknown purpose {purpose!r} of a random stream; valid purposes: {', '.join(PURPOSES)}")
+            sequence = self._parents[run].bit_generator.seed_seq
+            key = (*sequence.spawn_key, PURPOSES.index(purpose))
+            child = np.random.Generator(np.random.PCG64(np.random.SeedSequence(sequence.entropy, spawn_key=key)))
+            self._children[run, purpose] = child
+        return child

@@ -1,0 +1,435 @@
+"""Optimal attacks on a small synthetic filter: a double integrator per axis with an acceleration bias, embedded in the
+15 states."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import ncx2
+
+from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.optimum import (
+    best_budget,
+    best_ramp,
+    bounded_optimum,
+    dynamic_programme,
+    expected_play,
+    noncentrality_optimum,
+    upper_bound,
+)
+from spoofgym.optimum.bounded import LogScore
+from spoofgym.optimum.response import error_response, increment_maps
+from spoofgym.optimum.survival import log_survival, log_survival_and_slope
+from spoofgym.optimum.upper_bound import aimed_gain, separable_optimum
+
+THRESHOLD = 25.9
+LIMITS = (0.2, 0.5, 1.0, 2.0, 4.0, None)
+
+
+@cache
+def synthetic_model(num_epochs: int, dimension: int = 3, interval: float = 1.0) -> LinearModel:
+    """A steady filter by its own Riccati recursion; the axes differ, and east feels north, so that directions
+    matter."""
+    n, axes = 15, range(3)
+    position, velocity, bias = slice(6, 9), slice(3, 6), slice(12, 15)
+    transition = np.eye(n)
+    transition[position, velocity] = interval * np.eye(3)
+    transition[velocity, bias] = interval * np.eye(3)
+    transition[position, bias] = 0.5 * interval**2 * np.eye(3)
+    transition[6, 4] = 0.05 * interval
+    noise = np.diag(np.repeat([0.0, 1.0, 1e-4, 0.0, 0.0], 3) * np.tile([0.02, 0.03, 0.02], 5)) * interval
+    noise[velocity, velocity] **= 2
+    sigma = np.array([3.7, 2.5, 6.0, 0.2, 0.2, 0.2])[:dimension]
+    observation = np.zeros((dimension, 9))
+    observation[axes, [6, 7, 8]] = 1.0
+    if dimension == 6:
+        observation[[3, 4, 5], [3, 4, 5]] = 1.0
+    full = np.hstack((observation, np.zeros((dimension, 6))))
+    covariance = np.diag(np.repeat([1e-8, 0.01, 10.0, 1e-12, 2.5e-5], 3))
+    priors, factors, gains = [], [], []
+    warm_up = 60
+    for epoch in range(warm_up + num_epochs + 1):
+        if epoch == warm_up:
+            start = covariance
+        covariance = transition @ covariance @ transition.T + noise
+        priors.append(covariance)
+        factors.append(np.linalg.cholesky(full @ covariance @ full.T + np.diag(sigma**2)))
+        gains.append(np.linalg.solve(factors[-1], full @ covariance).T)
+        covariance = covariance - gains[-1] @ gains[-1].T
+
+    def every(matrix: np.ndarray) -> np.ndarray:
+        return np.repeat(matrix[None], num_epochs + 1, axis=0)
+
+    factor = np.array(factors[warm_up:])
+    return LinearModel(
+        time=800.0 + interval * np.arange(num_epochs + 1),
+        transition=every(transition),
+        process_noise=every(noise),
+        noise_factor=every(np.sqrt(noise[:9, :9])),
+        observation=every(observation),
+        measurement_covariance=np.diag(sigma**2),
+        prior_covariance=start,
+        covariance=np.array(priors[warm_up:]),
+        innovation_covariance=factor @ factor.transpose(0, 2, 1),
+        innovation_factor=factor,
+        whitened_gain=np.array(gains[warm_up:]),
+    )
+
+
+def ramp_offsets(model: LinearModel, rate: float, azimuth: float) -> np.ndarray:
+    direction = np.array([np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth)), 0.0])
+    return rate * (model.time[1:] - model.time[0])[:, None] * direction
+
+
+# What one epoch costs
+
+
+@pytest.mark.parametrize("dimension", [1, 3, 6])
+@pytest.mark.parametrize("threshold", [0.5, 7.8, 25.9, 200.0])
+def test_survival_of_an_epoch_agrees_with_scipy(dimension, threshold):
+    magnitude = np.array([0.0, 0.1, 1.0, 3.0, 5.0, 6.0, 8.0, 10.0])
+    square = np.maximum(magnitude**2, 1e-300)
+    value, slope = log_survival_and_slope(magnitude, dimension, threshold)
+    np.testing.assert_allclose(value, ncx2.logcdf(threshold, dimension, square), rtol=1e-9, atol=1e-13)
+    ratio = ncx2.cdf(threshold, dimension + 2, square) / ncx2.cdf(threshold, dimension, square)
+    np.testing.assert_allclose(slope, 0.5 * (ratio - 1.0), rtol=1e-9, atol=1e-13)
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_survival_stays_finite_and_falls_far_in_the_tail(dimension):
+    magnitude = np.array([0.0, 1e-200, 10.0, 100.0, 1000.0, 1005.0, 1005.2, 1e5, 1e8])
+    value, slope = log_survival_and_slope(magnitude, dimension, THRESHOLD)
+    assert np.isfinite(value).all()
+    assert np.isfinite(slope).all()
+    assert (np.diff(value) <= 0.0).all()
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_the_tail_expansion_continues_the_mixture(dimension):
+    sides = np.sqrt(THRESHOLD) + 1000.0 * np.array([1.0 - 1e-12, 1.0 + 1e-12])
+    value, slope = log_survival_and_slope(sides, dimension, THRESHOLD)
+    np.testing.assert_allclose(value[0], value[1], rtol=1e-7)
+    np.testing.assert_allclose(slope[0], slope[1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_survival_is_log_concave(dimension):
+    magnitude = np.linspace(0.0, 12.0, 2001)
+    second = np.diff(log_survival(magnitude, dimension, THRESHOLD), n=2)
+    assert second.max() < 1e-12
+
+
+# What a sequence of offsets is worth
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_expected_play_agrees_with_the_simulated_filter(dimension):
+    """Survival and both components of the mean error given survival, within 5 standard errors.
+
+    False-failure probability 3 x 5.7e-7; the seed is fixed.
+    """
+    model, threshold, runs = synthetic_model(12, dimension), 9.0 + dimension, 40_000
+    offsets = ramp_offsets(model, 0.8 if dimension == 3 else 0.2, 60.0)
+    expected = expected_play(model, offsets, threshold)
+    survived, error = simulate(model, expected.offsets, threshold, runs, np.random.default_rng(1))
+    sigma = np.sqrt(expected.survival * (1.0 - expected.survival) / runs)
+    assert 0.3 < expected.survival < 0.9
+    assert abs(survived.mean() - expected.survival) < 5.0 * sigma
+    left = error[survived]
+    standard_error = left.std(axis=0) / np.sqrt(len(left))
+    assert (np.abs(left.mean(axis=0) - expected.final_error) < 5.0 * standard_error).all()
+
+
+def simulate(model, offsets, threshold, runs, generator):
+    """The stochastic recursion, step by step: (survived (runs,), horizontal error after the last epoch (runs, 2))."""
+    posterior = model.covariance[0] - model.whitened_gain[0] @ model.whitened_gain[0].T
+    error = generator.multivariate_normal(np.zeros(15), posterior, runs, method="eigh")
+    survived = np.ones(runs, dtype=bool)
+    previous = np.zeros(3)
+    for k, offset in enumerate(offsets, start=1):
+        rate = (offset - previous) / (model.time[k] - model.time[k - 1])
+        spoofing = np.concatenate((offset, rate))[: model.dimension]
+        previous = offset
+        process = generator.multivariate_normal(np.zeros(15), model.process_noise[k], runs, method="eigh")
+        error = error @ model.transition[k].T + process
+        receiver = generator.standard_normal((runs, model.dimension)) * np.sqrt(np.diag(model.measurement_covariance))
+        residual = error[:, :9] @ model.observation[k].T - spoofing - receiver
+        whitened = np.linalg.solve(model.innovation_factor[k], residual.T).T
+        survived &= (whitened**2).sum(axis=1) <= threshold
+        error = error - whitened @ model.whitened_gain[k].T
+    return survived, error[:, 6:8]
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_a_batch_gives_the_same_bits_as_single_plays(dimension):
+    model = synthetic_model(9, dimension)
+    offsets = np.random.default_rng(2).normal(size=(5, 9, 3)).cumsum(axis=1)
+    batch = expected_play(model, offsets, THRESHOLD)
+    assert batch.whitened.shape == (5, 9, dimension)
+    for b in range(5):
+        single = expected_play(model, offsets[b], THRESHOLD)
+        for name in ("whitened", "final_error", "log_survival", "survival", "score"):
+            np.testing.assert_array_equal(getattr(single, name), getattr(batch, name)[b])
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_the_linear_maps_agree_with_the_recursion(dimension):
+    model = synthetic_model(9, dimension, interval=0.5)
+    increments = np.random.default_rng(3).normal(size=(9, 3))
+    played = expected_play(model, increments.cumsum(axis=0), THRESHOLD)
+    innovations, error = increment_maps(model)
+    np.testing.assert_allclose(innovations @ increments.ravel(), played.whitened.ravel(), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(error @ increments.ravel(), played.final_error, rtol=1e-10)
+    response = error_response(model, 9)
+    np.testing.assert_allclose(np.einsum("jkm,km->j", response, played.whitened), played.final_error, rtol=1e-10)
+
+
+def test_nothing_sent_moves_nothing():
+    model = synthetic_model(9)
+    played = expected_play(model, np.zeros((9, 3)), THRESHOLD)
+    assert played.score == 0.0
+    np.testing.assert_allclose(played.survival, ncx2.cdf(THRESHOLD, 3, 1e-300) ** 9)
+
+
+def test_an_absurd_attack_is_worth_nothing_and_gives_no_nan():
+    played = expected_play(synthetic_model(9), ramp_offsets(synthetic_model(9), 1e6, 90.0), THRESHOLD)
+    assert played.score == 0.0
+    assert np.isfinite(played.log_survival)
+
+
+# The closed form
+
+
+def test_closed_form_offsets_provoke_its_innovations():
+    model = synthetic_model(20)
+    attack = noncentrality_optimum(model, 20, 100.0)
+    played = expected_play(model, attack.offsets, THRESHOLD)
+    np.testing.assert_allclose(played.whitened, attack.whitened, atol=1e-10)
+    np.testing.assert_allclose((attack.whitened**2).sum(), 100.0)
+    np.testing.assert_allclose(np.hypot(*played.final_error), attack.final_error)
+    assert 0.0 <= attack.azimuth < 180.0
+
+
+def test_closed_form_beats_random_search():
+    model = synthetic_model(20)
+    attack = noncentrality_optimum(model, 4, 9.0)
+    whitened = np.random.default_rng(4).normal(size=(20_000, 4, 3))
+    whitened *= 3.0 / np.linalg.norm(whitened, axis=(1, 2))[:, None, None]
+    reached = np.linalg.norm(np.einsum("jkm,bkm->bj", error_response(model, 4), whitened), axis=1)
+    assert 0.8 * attack.final_error < reached.max() <= attack.final_error
+
+
+def test_closed_form_is_what_a_general_optimiser_finds():
+    model = synthetic_model(5)
+    attack = noncentrality_optimum(model, 5, 9.0)
+    innovations, error = increment_maps(model)
+    found = minimize(
+        lambda v: -np.linalg.norm(error @ v),
+        np.ones(15),
+        jac=lambda v: -error.T @ (error @ v) / np.linalg.norm(error @ v),
+        constraints={
+            "type": "ineq",
+            "fun": lambda v: 9.0 - ((innovations @ v) ** 2).sum(),
+            "jac": lambda v: -2.0 * innovations.T @ (innovations @ v),
+        },
+        method="SLSQP",
+        options={"maxiter": 500, "ftol": 1e-12},
+    )
+    assert found.success
+    np.testing.assert_allclose(-found.fun, attack.final_error, rtol=1e-6)
+
+
+def test_best_budget_beats_every_other_budget():
+    model = synthetic_model(40)
+    attack, played = best_budget(model, THRESHOLD)
+    budgets = np.geomspace(0.1, 10.0, 401) * attack.budget
+    offsets = np.sqrt(budgets / attack.budget)[:, None, None] * attack.offsets
+    scores = expected_play(model, offsets, THRESHOLD).score
+    assert scores.max() <= played.score * (1.0 + 1e-12)
+    assert scores.max() > played.score * (1.0 - 1e-4)
+
+
+# The best ramp
+
+
+@pytest.mark.parametrize("limit", [None, (4.0, 1.0, 4.0)])
+def test_best_ramp_beats_a_brute_grid(limit):
+    model = synthetic_model(20)
+    best = best_ramp(model, THRESHOLD, None if limit is None else np.array(limit))
+    azimuth, rate = np.meshgrid(np.arange(0.0, 180.0, 2.0), np.arange(0.05, 5.0, 0.05))
+    offsets = np.stack([ramp_offsets(model, r, a) for r, a in zip(rate.ravel(), azimuth.ravel(), strict=True)])
+    allowed = np.ones(len(offsets), dtype=bool)
+    if limit is not None:
+        allowed = (np.abs(offsets[:, 0]) <= np.array(limit) + 1e-12).all(axis=1)
+        assert (np.abs(best.outcome.offsets[0]) <= np.array(limit) + 1e-9).all()
+    scores = expected_play(model, offsets[allowed], THRESHOLD).score
+    assert best.outcome.score * (1.0 - 3e-3) < scores.max() <= best.outcome.score
+    np.testing.assert_allclose(best.outcome.offsets, ramp_offsets(model, best.rate, best.azimuth), atol=1e-9)
+
+
+def test_best_ramp_in_a_given_direction():
+    model = synthetic_model(20)
+    east = best_ramp(model, THRESHOLD, azimuth=90.0)
+    west = best_ramp(model, THRESHOLD, azimuth=270.0)
+    assert (east.azimuth, west.azimuth) == (90.0, 270.0)
+    np.testing.assert_allclose(east.outcome.score, west.outcome.score)
+    assert east.outcome.score <= best_ramp(model, THRESHOLD).outcome.score
+
+
+# The optimum within limits
+
+
+@pytest.mark.parametrize("dimension", [3, 6])
+def test_gradient_agrees_with_finite_differences(dimension):
+    log_score = LogScore(synthetic_model(8, dimension), THRESHOLD)
+    generator = np.random.default_rng(5)
+    for _ in range(5):
+        increments = generator.normal(size=24)
+        _, gradient = log_score.loss(increments)
+        step = 1e-6
+        for i in range(24):
+            shift = step * np.eye(24)[i]
+            slope = (log_score.loss(increments + shift)[0] - log_score.loss(increments - shift)[0]) / (2.0 * step)
+            np.testing.assert_allclose(gradient[i], slope, rtol=1e-5, atol=1e-7)
+
+
+@cache
+def optima():
+    return [bounded_optimum(synthetic_model(40), THRESHOLD, limit) for limit in LIMITS]
+
+
+def test_bounded_optimum_lies_between_its_neighbours():
+    model = synthetic_model(40)
+    bound = upper_bound(model, THRESHOLD)
+    closed_form, _ = best_budget(model, THRESHOLD)
+    increments = np.diff(closed_form.offsets, axis=0, prepend=np.zeros((1, 3)))
+    for limit, best in zip(LIMITS, optima(), strict=True):
+        step = np.inf if limit is None else limit
+        clipped = expected_play(model, np.clip(increments, -step, step).cumsum(axis=0), THRESHOLD)
+        ramp = best_ramp(model, THRESHOLD, limit)
+        assert best.score <= bound.score
+        assert best.score >= clipped.score
+        assert best.score >= ramp.outcome.score * (1.0 - 1e-9)
+        assert best.score == pytest.approx(float(best.outcome.score))
+        if limit is not None:
+            assert np.abs(best.actions).max() <= 1.0
+            np.testing.assert_allclose(best.actions.cumsum(axis=0) * limit, best.outcome.offsets, atol=1e-9)
+
+
+def test_bounded_optimum_grows_with_the_limit_up_to_the_upper_bound():
+    scores = [best.score for best in optima()]
+    assert (np.diff(scores) > 0.0).all()
+    np.testing.assert_allclose(scores[-1], upper_bound(synthetic_model(40), THRESHOLD).score, rtol=1e-4)
+
+
+@pytest.mark.parametrize("index", [1, 2, 3, 4])
+def test_bounded_optimum_is_certified_for_its_direction(index):
+    """For a fixed direction the log-score is concave: its maximum exceeds a point by at most the gain of the tangent
+    plane on the box."""
+    limit, best = LIMITS[index], optima()[index]
+    increments = (best.actions * limit).ravel()
+    gradient = -LogScore(synthetic_model(40), THRESHOLD).loss(increments)[1]
+    gap = np.abs(gradient).sum() * limit - gradient @ increments
+    assert abs(gap) < 1e-4
+
+
+@pytest.mark.parametrize("index", [2, 4])
+def test_no_other_direction_of_start_finds_more(index):
+    limit, best = LIMITS[index], optima()[index]
+    log_score = LogScore(synthetic_model(40), THRESHOLD)
+    generator = np.random.default_rng(6)
+    for _ in range(6):
+        start = np.repeat(generator.uniform(-0.5, 0.5, (1, 3)), 40, axis=0).ravel()
+        found = minimize(log_score.loss, start, jac=True, method="L-BFGS-B", bounds=[(-limit, limit)] * 120)
+        assert np.exp(-found.fun) <= best.score * (1.0 + 1e-9)
+
+
+def test_bounded_optimum_with_velocity_fixes():
+    model = synthetic_model(20, 6)
+    limits = np.array([0.1, 0.2, 0.1])
+    best, free = bounded_optimum(model, THRESHOLD, limits), bounded_optimum(model, THRESHOLD, None)
+    assert best_ramp(model, THRESHOLD, limits).outcome.score <= best.score < free.score
+    assert free.score < upper_bound(model, THRESHOLD).score
+
+
+# The upper bound
+
+
+def test_upper_bound_is_attained_by_a_play():
+    bound = upper_bound(synthetic_model(40), THRESHOLD)
+    assert bound.attained <= bound.score <= bound.attained * (1.0 + 2e-4)
+    assert bound.spending.shape == (40,)
+
+
+def test_dynamic_programme_agrees_with_the_dual_in_every_direction():
+    model = synthetic_model(20)
+    for azimuth in (0.0, 50.0, 130.0):
+        gain = aimed_gain(error_response(model, 20), np.array([azimuth]))
+        _, attained, bound = separable_optimum(gain, 3, THRESHOLD)
+        lattice = dynamic_programme(model, THRESHOLD, azimuth)
+        assert lattice.change < 1e-3
+        assert np.exp(bound[0]) * (1.0 - 1e-3) < lattice.score <= np.exp(bound[0])
+        assert attained[0] <= bound[0] < attained[0] + 1e-4
+
+
+def test_random_attacks_stay_below_the_upper_bound():
+    model = synthetic_model(20)
+    generator = np.random.default_rng(7)
+    offsets = generator.normal(size=(2000, 20, 3)).cumsum(axis=1) + ramp_offsets(model, 1.0, 30.0)
+    assert expected_play(model, offsets, THRESHOLD).score.max() < upper_bound(model, THRESHOLD).score
+
+
+# Bad input
+
+
+@pytest.mark.parametrize("num_epochs", [0, 6])
+def test_epochs_that_the_model_does_not_have_are_refused(num_epochs):
+    with pytest.raises(ValueError, match=r"num_epochs must lie in 1\.\.5"):
+        noncentrality_optimum(synthetic_model(5), num_epochs, 1.0)
+
+
+@pytest.mark.parametrize("budget", [-1.0, np.nan, np.inf])
+def test_an_impossible_budget_is_refused(budget):
+    with pytest.raises(ValueError, match="budget"):
+        noncentrality_optimum(synthetic_model(5), 5, budget)
+
+
+def test_the_closed_form_needs_position_fixes():
+    model = synthetic_model(5, 6)
+    with pytest.raises(ValueError, match="m = 6"):
+        noncentrality_optimum(model, 5, 1.0)
+    with pytest.raises(ValueError, match="m = 6"):
+        best_budget(model, THRESHOLD)
+
+
+@pytest.mark.parametrize("threshold", [0.0, -1.0, np.nan, np.inf])
+def test_an_impossible_threshold_is_refused(threshold):
+    model = synthetic_model(5)
+    for call in (best_budget, best_ramp, upper_bound):
+        with pytest.raises(ValueError, match="threshold"):
+            call(model, threshold)
+    with pytest.raises(ValueError, match="threshold"):
+        bounded_optimum(model, threshold, 1.0)
+    with pytest.raises(ValueError, match="threshold"):
+        dynamic_programme(model, threshold, 0.0)
+    with pytest.raises(ValueError, match="threshold"):
+        expected_play(model, np.zeros((5, 3)), threshold)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, (1.0, 1.0), (1.0, 0.0, 1.0)])
+def test_an_impossible_drag_off_rate_is_refused(rate):
+    for call in (best_ramp, bounded_optimum):
+        with pytest.raises(ValueError, match="drag_off_rate"):
+            call(synthetic_model(5), THRESHOLD, rate)
+
+
+@pytest.mark.parametrize("offsets", [np.zeros((4, 3)), np.zeros((5, 2)), np.zeros(3), np.full((5, 3), np.nan)])
+def test_wrong_offsets_are_refused(offsets):
+    with pytest.raises(ValueError, match="offsets"):
+        expected_play(synthetic_model(5), offsets, THRESHOLD)
+
+
+def test_a_tolerance_that_is_not_positive_is_refused():
+    with pytest.raises(ValueError, match="tolerance"):
+        dynamic_programme(synthetic_model(5), THRESHOLD, 0.0, tolerance=0.0)

@@ -1,0 +1,127 @@
+"""PPO on the native vector environment: its settings, its checkpoints, and what it leaves behind.
+
+A minibatch of SB3's default size trains at 4,000 steps/s, one of a few thousand at 30,000 and more: the update is the cost, so the
+rollout is one whole game of many lanes, cut into a few large minibatches.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from gymnasium.vector import AutoresetMode
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecMonitor
+
+from agents.learned import CONFIG_FILE, LearnedSpoofer
+from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.sb3 import SB3VecEnv
+from spoofgym.envs.vector import SpooferVectorEnv
+
+CHECKPOINT_FILE = "checkpoint.pt"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Settings of the learner.
+
+    Attributes:
+        lanes: games played at once.
+        minibatches: of a rollout, which is one whole game of every lane.
+        epochs: passes over a rollout.
+        learning_rate: at the start; falls linearly to zero at the last step.
+        log_std: of the policy at the start.
+        gae_lambda: of the advantage estimate; the discount is 1, since the game is finite.
+        clip_range: of the policy ratio.
+        hidden: width of the two hidden layers of policy and value.
+    """
+
+    lanes: int = 256
+    minibatches: int = 8
+    epochs: int = 10
+    learning_rate: float = 2e-3
+    log_std: float = -1.5
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    hidden: int = 64
+
+
+def environment_arguments(config: SpooferConfig) -> dict[str, Any]:
+    """The arguments that rebuild the environment, for ``config.json``."""
+    arguments = asdict(config)
+    if not all(isinstance(arguments[key], str) for key in ("scenario", "detector", "response")):
+        raise ValueError("a training run needs scenario, detector and response by their specifications")
+    return arguments
+
+
+def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: Path) -> PPO:
+    """A PPO learner on ``settings.lanes`` lanes of the game, seeded; TensorBoard writes into ``folder``."""
+    vector = SpooferVectorEnv(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
+    horizon = vector.game.scenario.timeline.num_epochs
+    environment = VecMonitor(SB3VecEnv(vector))
+    return PPO(
+        "MlpPolicy",
+        environment,
+        n_steps=horizon,
+        batch_size=max(1, settings.lanes * horizon // settings.minibatches),
+        n_epochs=settings.epochs,
+        learning_rate=lambda remaining: settings.learning_rate * remaining,
+        gamma=1.0,
+        gae_lambda=settings.gae_lambda,
+        clip_range=settings.clip_range,
+        policy_kwargs={"net_arch": [settings.hidden, settings.hidden], "log_std_init": settings.log_std},
+        tensorboard_log=str(folder / "tensorboard"),
+        seed=seed,
+        device="cpu",
+    )
+
+
+def write_config(folder: Path, config: SpooferConfig, settings: Settings, seed: int, steps: int) -> None:
+    """Write ``config.json``: what the policy was trained on and how."""
+    content = {
+        "environment": environment_arguments(config),
+        "learner": asdict(settings),
+        "seed": seed,
+        "steps": steps,
+    }
+    (folder / CONFIG_FILE).write_text(json.dumps(content, indent=2) + "\n")
+
+
+def export(learner: PPO, config: SpooferConfig, folder: Path) -> LearnedSpoofer:
+    """The learner's policy as plain arrays, also written into ``folder``."""
+    layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
+    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
+    vector: SpooferVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
+    policy = LearnedSpoofer(
+        folder.resolve().name,
+        config,
+        tuple(field.name for field in vector.game.fields),
+        tuple(layer.weight.detach().numpy().copy() for layer in linear),
+        tuple(layer.bias.detach().numpy().copy() for layer in linear),
+    )
+    policy.save(folder)
+    return policy
+
+
+def save_checkpoint(learner: PPO, folder: Path) -> None:
+    """Everything that goes on learning, without a pickle: tensors and numbers only."""
+    temporary = folder / f".{CHECKPOINT_FILE}"
+    torch.save({"parameters": learner.get_parameters(), "num_timesteps": learner.num_timesteps}, temporary)
+    temporary.replace(folder / CHECKPOINT_FILE)
+
+
+def load_checkpoint(learner: PPO, folder: Path) -> None:
+    """Put a learner where a checkpoint left off.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    path = folder / CHECKPOINT_FILE
+    if not path.is_file():
+        raise FileNotFoundError(f"{folder} has no {CHECKPOINT_FILE} to resume from")
+    state = torch.load(path, weights_only=True)
+    learner.set_parameters(state["parameters"], exact_match=True, device="cpu")
+    learner.num_timesteps = state["num_timesteps"]
