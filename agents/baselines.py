@@ -15,7 +15,7 @@ from spoofgym.detectors.chi_square import Snapshot
 from spoofgym.evaluation.metrics import undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes
 from spoofgym.arrays import Floats
-from spoofgym.optimum import best_budget, best_ramp, bounded_optimum, expected_play, noncentrality_optimum, upper_bound
+from spoofgym.optimum import best_budget, best_ramp, bounded_optimum, noncentrality_optimum, upper_bound
 from spoofgym.scenario import Scenario
 
 Play = Callable[[Attack, int], Episodes]
@@ -51,17 +51,16 @@ def exact_threshold(scenario: Scenario, detectors: list[Detector]) -> float | No
 def known_baselines(scenario: Scenario, threshold: float) -> list[Baseline]:
     """The baselines of a game with exact values, each computed without a simulation."""
     model = scenario.linear_model()
-    still = expected_play(model, np.zeros((model.num_epochs, 3)), threshold)
     ramp = best_ramp(model, threshold, np.array(scenario.drag_off_rate))
     closed, closed_outcome = best_budget(model, threshold)
     optimum = bounded_optimum(model, threshold, np.array(scenario.drag_off_rate))
     return [
-        Baseline("none", "blind", make_attack("none"), still.score),
+        Baseline("none", "blind", make_attack("none"), None),
         Baseline("random", "blind", RandomRates(scenario.drag_off_rate), None),
         Baseline("best-ramp", "shadow", _ramp(ramp.rate, ramp.azimuth), float(ramp.outcome.score)),
         Baseline("closed-form", "shadow", OffsetSequence("closed-form", closed.offsets), float(closed_outcome.score)),
-        Baseline("optimum", "shadow", OffsetSequence("optimum", optimum.outcome.offsets), optimum.score),
-        Baseline("upper-bound", "shadow", None, upper_bound(model, threshold).score),
+        Baseline("optimum", "shadow", OffsetSequence("optimum", optimum.outcome.offsets), float(optimum.score)),
+        Baseline("upper-bound", "shadow", None, float(upper_bound(model, threshold).score)),
     ]
 
 

@@ -23,7 +23,7 @@ DEFAULT_WINDOW = 20
 SHADMEHRI_THRESHOLD = 25.9
 """Chi-square quantile for 3 degrees of freedom at 1e-5 as published (Shadmehri and Esfanjani 2025, eq 15)."""
 
-WINDOWED_THRESHOLDS: dict[tuple[int, int, float], float] = {(3, 20, 1e5): 0.0}
+WINDOWED_THRESHOLDS: dict[tuple[int, int, float], float] = {(3, 20, 1e5): 114.41}
 """Thresholds of the windowed test by (m, n, ARL0), for white innovations. A row is reproduced, with its interval, by
 ``python -m spoofgym.calibration --dimension 3 --window 20 --arl0 1e5``.
 """

@@ -58,6 +58,7 @@ class SpooferGame:
         simulation: the world.
         shadow: the spoofer's copy of the filter, or None for a blind one.
         error: horizontal error of the estimate when last resolved, (N,), m.
+        offset: that the spoofer means to send in the present epoch, (N, 3), m ENU.
     """
 
     def __init__(self, config: SpooferConfig, num_lanes: int) -> None:
@@ -86,7 +87,7 @@ class SpooferGame:
         self.error = np.zeros(num_lanes)
         self._squash = Squash(fields)
         self._start_error = np.zeros(num_lanes)
-        self._offset = np.zeros((num_lanes, 3))
+        self.offset = np.zeros((num_lanes, 3))
         self._velocity = scenario.velocity()
         self._rate = np.array(scenario.drag_off_rate) * scenario.timeline.interval
         self._horizon = scenario.timeline.num_epochs
@@ -110,7 +111,7 @@ class SpooferGame:
         error = self._horizontal()[lanes]
         self.error[lanes] = error
         self._start_error[lanes] = error
-        self._offset[lanes] = 0.0
+        self.offset[lanes] = 0.0
         self._alarmed[lanes] = False
         if self.config.tracking_sigma:
             sigma = self.config.tracking_sigma
@@ -144,12 +145,12 @@ class SpooferGame:
         simulation = self.simulation
         simulation.resolve()
         error = self._horizontal()
-        previous = self._offset
-        self._offset = self._intend(np.clip(actions, -1.0, 1.0), previous)
+        previous = self.offset
+        self.offset = self._intend(np.clip(actions, -1.0, 1.0), previous)
         if restarting is not None and len(restarting):
             simulation.restart(restarting)
-            self._offset[restarting] = 0.0
-        sent = self._offset
+            self.offset[restarting] = 0.0
+        sent = self.offset
         if self.config.tracking_sigma:
             following = np.minimum(simulation.epoch.index + 1, self._horizon)
             sent = sent + self._tracking[self._all, following, :3]
@@ -160,7 +161,7 @@ class SpooferGame:
             self._begin(restarting)
             error[restarting] = self.error[restarting]
         if self.shadow is not None:
-            self.shadow.advance(epoch.index, self._offset, previous, self.scenario.timeline.interval)
+            self.shadow.advance(epoch.index, self.offset, previous, self.scenario.timeline.interval)
         return self._score(error)
 
     def _intend(self, actions: Floats, previous: Floats) -> Floats:
@@ -192,7 +193,7 @@ class SpooferGame:
         """What each lane's spoofer sees, (N, D)."""
         epoch, scenario = self.simulation.epoch, self.scenario
         raw = np.empty((self.num_lanes, len(self.fields)))
-        raw[:, 0:3] = self._offset
+        raw[:, 0:3] = self.offset
         raw[:, 3] = epoch.index / self._horizon
         raw[:, 4:7] = self._velocity[epoch.index]
         if self.config.tracking_sigma:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ def undetected_error(episodes: Episodes) -> Floats:
 def mean_interval(values: Floats) -> tuple[float, float]:
     """95 % interval of a mean by the central limit theorem; a single value gives an interval of no length."""
     mean = float(np.mean(values))
-    half = NORMAL_95 * float(np.std(values, ddof=1)) / np.sqrt(len(values)) if len(values) > 1 else 0.0
+    half = NORMAL_95 * float(np.std(values, ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
     return mean - half, mean + half
 
 

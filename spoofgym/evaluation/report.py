@@ -1,0 +1,89 @@
+"""Results as JSON rows: the schemas that programs print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.metrics import AttackerScore
+from spoofgym.scenario import Scenario
+
+SCHEMA_VERSION = 1
+
+
+def detector_entry(detectors: Sequence[Detector], scenario: Scenario) -> dict[str, Any]:
+    """``{"name", "threshold", "arl0"}``; several detectors are named together and have no common threshold.
+
+    ARL₀ is null unless the threshold was calibrated in the scenario, or the scenario's innovations are white and theory gives it.
+    """
+    if len(detectors) != 1:
+        return {"name": " + ".join(detector.name for detector in detectors), "threshold": None, "arl0": None}
+    detector = detectors[0]
+    known = detector.calibrated or scenario.matched
+    return {"name": detector.name, "threshold": detector.threshold, "arl0": detector.arl0 if known else None}
+
+
+def attacker_row(
+    name: str, knowledge: str, score: AttackerScore | None, exact: float | None, optimum: float | None
+) -> dict[str, Any]:
+    """One row of an ``"attackers"`` report.
+
+    Args:
+        name: of the attacker.
+        knowledge: of the victim that it needs.
+        score: from simulation; None where nothing was played.
+        exact: its exact undetected error, m, where it is known.
+        optimum: of the game, m, where it is known. The fraction is of the exact score where there is one, else of the simulated.
+    """
+    row: dict[str, Any] = {
+        "attacker": name,
+        "knowledge": knowledge,
+        "episodes": None,
+        "mean_undetected_error_m": None,
+        "ci95_m": None,
+        "exact_undetected_error_m": exact,
+        "detection_probability": None,
+        "median_time_to_detect_s": None,
+        "error_at_detection_m": None,
+        "fraction_of_optimum": None,
+    }
+    if score is not None:
+        row |= {
+            "episodes": score.episodes,
+            "mean_undetected_error_m": score.mean_undetected_error,
+            "ci95_m": list(score.interval),
+            "detection_probability": score.detection_probability,
+            "median_time_to_detect_s": score.median_time_to_detect,
+            "error_at_detection_m": score.error_at_detection,
+        }
+    achieved = exact if exact is not None else row["mean_undetected_error_m"]
+    if optimum is not None and achieved is not None:
+        row["fraction_of_optimum"] = achieved / optimum
+    return row
+
+
+def attackers_report(
+    scenario: Scenario, fidelity: str, detectors: Sequence[Detector], rows: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """A whole ``"attackers"`` report."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "attackers",
+        "scenario": scenario.name,
+        "fidelity": fidelity,
+        "detector": detector_entry(detectors, scenario),
+        "rows": rows,
+    }
+
+
+def recorded_report(scenario: Scenario, detectors: Sequence[Detector], rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """A whole ``"recorded"`` report."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "recorded",
+        "scenario": scenario.name,
+        "fidelity": "strapdown",
+        "detector": detector_entry(detectors, scenario),
+        "rows": rows,
+    }

@@ -1,0 +1,124 @@
+"""All attackers of one game, evaluated on the same noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from agents.baselines import Baseline, known_baselines, searched_baselines
+from agents.learned import LearnedSpoofer
+from spoofgym.arrays import Floats
+from spoofgym.attacks.base import Attack
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.evaluation.metrics import attacker_score
+from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
+from spoofgym.evaluation.report import attacker_row
+from spoofgym.optimum import expected_play
+from spoofgym.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What every attacker is evaluated on.
+
+    Attributes:
+        scenario: of the game.
+        detector_names: their specifications.
+        detectors: with their thresholds.
+        fidelity: of the simulation.
+        episodes: games of each attacker.
+        seed: of game 0.
+        threads: of the simulation.
+        threshold: of the snapshot test where exact values exist, else None.
+    """
+
+    scenario: Scenario
+    detector_names: tuple[str, ...]
+    detectors: list[Detector]
+    fidelity: str
+    episodes: int
+    seed: int
+    threads: int
+    threshold: float | None
+
+    def rows(self, policies: list[LearnedSpoofer], attacks: list[Attack], console: Console) -> list[dict[str, Any]]:
+        """Rows of the baselines, of scripted attacks and of policies, in this order."""
+        for policy in policies:
+            policy.check_layout(self._game(policy, 1).fields)
+        with console.status("baselines"):
+            baselines = self._baselines()
+        optimum = next((baseline.exact for baseline in baselines if baseline.name == "optimum"), None)
+        rows = []
+        for baseline in baselines:
+            rows.append(self._row(baseline, optimum, console))
+        for attack in attacks:
+            rows.append(self._row(Baseline(attack.name, "blind", attack, None), optimum, console))
+        for policy in policies:
+            with console.status(policy.name):
+                score = attacker_score(self._play_policy(policy))
+                exact = self._exact(policy)
+            rows.append(attacker_row(policy.name, policy.config.knowledge, score, exact, optimum))
+        return rows
+
+    def _baselines(self) -> list[Baseline]:
+        if self.threshold is not None:
+            return known_baselines(self.scenario, self.threshold)
+        return searched_baselines(self.scenario, lambda attack, episodes: self._play(attack, episodes))
+
+    def _row(self, baseline: Baseline, optimum: float | None, console: Console) -> dict[str, Any]:
+        score = None
+        if baseline.attack is not None:
+            with console.status(baseline.name):
+                score = attacker_score(self._play(baseline.attack, self.episodes))
+        return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
+
+    def _play(self, attack: Attack, episodes: int) -> Episodes:
+        return play_attack(
+            self.scenario,
+            attack,
+            self.detectors,
+            episodes,
+            self.seed,
+            fidelity=self.fidelity,
+            threads=self.threads,
+        )
+
+    def _game(self, policy: LearnedSpoofer, lanes: int) -> SpooferGame:
+        """The evaluated game as this policy sees it: its own knowledge and action."""
+        config: SpooferConfig = replace(
+            policy.config,
+            scenario=self.scenario,
+            detector=tuple(self.detectors),
+            fidelity=self.fidelity,
+            threads=self.threads,
+        )
+        return SpooferGame(config, lanes)
+
+    def _play_policy(self, policy: LearnedSpoofer) -> Episodes:
+        def make(lanes: int) -> SpooferGame:
+            return self._game(policy, lanes)
+
+        return play_policy(make, policy.act, self.episodes, self.seed)
+
+    def _exact(self, policy: LearnedSpoofer) -> float | None:
+        """Exact undetected error of a policy whose offsets do not depend on chance: blind or shadow, without tracking error."""
+        if self.threshold is None or policy.config.knowledge == "full" or policy.config.tracking_sigma:
+            return None
+        offsets = offsets_without_chance(self._game(policy, 1), policy.act)
+        return float(expected_play(self.scenario.linear_model(), offsets, self.threshold).score)
+
+
+def offsets_without_chance(game: SpooferGame, act: Callable[[Any], Any]) -> Floats:
+    """The offsets that a policy sends in a game of one lane, (K, 3), m ENU."""
+    game.reset(np.zeros(1, dtype=np.int64))
+    offsets = []
+    for _ in range(game.scenario.timeline.num_epochs):
+        game.step(act(game.observation()))
+        offsets.append(game.offset[0].copy())
+    return np.array(offsets)

@@ -1,0 +1,116 @@
+"""Evaluate spoofers against a detector.
+
+    python -m train.evaluate --scenario liu-flight --detector snapshot --attacker runs/x --seed 0 --json out.json
+    python -m train.evaluate --scenario recorded:FOLDER --attack ramp:0.5 --detector snapshot --json -
+
+The baselines are always evaluated: none, random, the best constant ramp, the closed form, the optimum, and the upper bound as a figure.
+Every attacker meets the same noise. A table goes to the terminal, a figure and JSON where asked; ``--json -`` prints JSON alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from agents.baselines import exact_threshold
+from agents.learned import LearnedSpoofer
+from spoofgym.attacks import make_attack
+from spoofgym.calibration import calibrated
+from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.recorded import evaluate_recorded
+from spoofgym.evaluation.report import attackers_report, recorded_report
+from spoofgym.scenario import FIDELITIES, Scenario
+from spoofgym.scenarios import make_scenario
+from spoofgym.scenarios.recorded import RecordedScenario
+from train.arguments import count, seed_number
+from train.attackers import Evaluation
+from train.presentation import attackers_figure, attackers_table, recorded_table
+
+EPISODES = {"linear": 20_000, "strapdown": 1_000}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = argparse.ArgumentParser(
+        prog="python -m train.evaluate", description="Evaluate spoofers against a detector, beside baselines and the exact optimum."
+    )
+    result.add_argument("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
+    result.add_argument("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
+    result.add_argument("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
+    result.add_argument("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
+    result.add_argument("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
+    result.add_argument("--episodes", type=count, help="games of each attacker (default: 20000 linear, 1000 strapdown)")
+    result.add_argument("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
+    result.add_argument("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
+    result.add_argument("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
+    result.add_argument("--figure", type=Path, help="write a figure (PNG, SVG or PDF by its ending)")
+    return result
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    console = Console(stderr=options.json == "-")
+    try:
+        report = _report(options, console)
+    except (ValueError, FileNotFoundError) as error:
+        Console(stderr=True).print(f"error: {error}", style="red", markup=False)
+        return 2
+    table = recorded_table if report["kind"] == "recorded" else attackers_table
+    console.print(table(report))
+    if options.figure is not None:
+        options.figure.parent.mkdir(parents=True, exist_ok=True)
+        attackers_figure(report, options.figure)
+        console.print(f"figure in {options.figure}", markup=False)
+    if options.json == "-":
+        print(json.dumps(report, allow_nan=False))
+    elif options.json is not None:
+        path = Path(options.json)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
+        console.print(f"rows in {path}", markup=False)
+    return 0
+
+
+def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
+    scenario = make_scenario(options.scenario)
+    fidelity = options.fidelity or scenario.fidelities[0]
+    scenario.check_fidelity(fidelity)
+    given = options.detector or ["snapshot"]
+    detectors = [calibrated(make_detector(name), scenario, fidelity) for name in given]
+    if isinstance(scenario, RecordedScenario):
+        return _recorded(options, scenario, detectors)
+    policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
+    evaluation = Evaluation(
+        scenario,
+        tuple(given),
+        detectors,
+        fidelity,
+        options.episodes or EPISODES[fidelity],
+        options.seed,
+        options.threads,
+        exact_threshold(scenario, detectors),
+    )
+    attacks = [make_attack(text) for text in options.attack]
+    rows = evaluation.rows(policies, attacks, console)
+    return attackers_report(scenario, fidelity, detectors, rows)
+
+
+def _recorded(options: argparse.Namespace, scenario: Scenario, detectors: list[Detector]) -> dict[str, Any]:
+    if options.attacker:
+        raise ValueError("a recorded log is evaluated with --attack; --attacker needs a simulated scenario")
+    if options.figure is not None:
+        raise ValueError("--figure draws attackers in a simulated scenario; a recorded log gives a table and JSON")
+    assert isinstance(scenario, RecordedScenario)
+    attacks = [make_attack(text) for text in options.attack or ["ramp:0.5"]]
+    return recorded_report(scenario, detectors, evaluate_recorded(scenario, attacks, detectors))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

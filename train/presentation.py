@@ -1,0 +1,125 @@
+"""Tables on the terminal and the figure of an evaluation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+BASELINE, LEARNED, BOUND = "#9a9a9a", "#0072b2", "#d55e00"
+BASELINES = ("none", "random", "best-ramp", "closed-form", "optimum", "upper-bound")
+
+
+def _number(value: float | None, form: str = ".1f") -> str:
+    return "–" if value is None else format(value, form)
+
+
+def attackers_table(report: dict[str, Any]) -> Table:
+    """An ``"attackers"`` report for the terminal."""
+    detector = report["detector"]
+    arl0 = f", ARL₀ {detector['arl0']:.3g} epochs" if detector["arl0"] else ""
+    threshold = f", threshold {detector['threshold']:.4g}" if detector["threshold"] else ""
+    table = Table(
+        title=f"{report['scenario']}, {report['fidelity']}, {detector['name']}{threshold}{arl0}",
+        caption="error: mean undetected horizontal error with 95 % interval; median: time by which half of the games had an "
+        "alarm; at alarm: mean error then; exact: without simulation",
+        box=SIMPLE_HEAD,
+    )
+    table.add_column("attacker", no_wrap=True)
+    table.add_column("knows", no_wrap=True)
+    for title in ("error\nm", "exact\nm", "detected\n", "median\ns", "at alarm\nm", "of\noptimum"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in report["rows"]:
+        error = "–"
+        if row["ci95_m"] is not None:
+            half = 0.5 * (row["ci95_m"][1] - row["ci95_m"][0])
+            error = f"{row['mean_undetected_error_m']:.2f} ± {half:.2f}"
+        table.add_row(
+            row["attacker"],
+            row["knowledge"],
+            error,
+            _number(row["exact_undetected_error_m"], ".2f"),
+            _number(row["detection_probability"], ".3f"),
+            _number(row["median_time_to_detect_s"], ".0f"),
+            _number(row["error_at_detection_m"]),
+            _number(row["fraction_of_optimum"], ".3f"),
+            style="bold" if row["attacker"] not in BASELINES else "",
+        )
+    return table
+
+
+def recorded_table(report: dict[str, Any]) -> Table:
+    """A ``"recorded"`` report for the terminal."""
+    table = Table(title=f"{report['scenario']}, {report['detector']['name']}", box=SIMPLE_HEAD)
+    table.add_column("attack", no_wrap=True)
+    for title in (
+        "clean\nmedian m",
+        "clean\n95 % m",
+        "mean\nNIS",
+        "false\nalarms",
+        "clean\nepochs",
+        "detected\n",
+        "after\ns",
+        "at alarm\nm",
+        "largest\nm",
+    ):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in report["rows"]:
+        table.add_row(
+            row["attack"],
+            _number(row["clean_error_median_m"], ".2f"),
+            _number(row["clean_error_p95_m"], ".2f"),
+            _number(row["mean_nis"], ".2f"),
+            str(row["false_alarms"]),
+            str(row["clean_epochs"]),
+            "yes" if row["detected"] else "no",
+            _number(row["time_to_detect_s"], ".1f"),
+            _number(row["error_at_detection_m"]),
+            _number(row["max_error_m"]),
+        )
+    return table
+
+
+def attackers_figure(report: dict[str, Any], path: Path) -> None:
+    """Bars of the undetected error of each attacker, with intervals, beside the optimum and the upper bound.
+
+    Raises:
+        ValueError: the file's ending names no picture format.
+    """
+    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise ValueError(f"--figure must end in .png, .svg or .pdf, got {path.name!r}")
+    played = [row for row in report["rows"] if row["mean_undetected_error_m"] is not None]
+    bounds = {row["attacker"]: row["exact_undetected_error_m"] for row in report["rows"]}
+    figure = Figure(figsize=(8.0, 0.55 * len(played) + 1.9), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    for place, row in enumerate(reversed(played)):
+        mean, (low, high) = row["mean_undetected_error_m"], row["ci95_m"]
+        colour = BASELINE if row["attacker"] in BASELINES else LEARNED
+        axes.barh(place, mean, color=colour, height=0.7)
+        axes.errorbar(mean, place, xerr=[[mean - low], [high - mean]], color="black", capsize=3, linewidth=1)
+        fraction = "" if row["fraction_of_optimum"] is None else f", {row['fraction_of_optimum']:.3f} of the optimum"
+        label = f"{mean:.1f} m{fraction}, detected {row['detection_probability']:.0%}"
+        inside = mean > 0.55 * max(r["mean_undetected_error_m"] for r in played)
+        axes.text(
+            mean - 0.6 if inside else high + 0.6,
+            place,
+            label,
+            va="center",
+            ha="right" if inside else "left",
+            color="white" if inside else "black",
+            fontsize=9,
+        )
+    if bounds.get("upper-bound") is not None:
+        axes.axvline(bounds["upper-bound"], color=BOUND, linestyle="--", linewidth=1.2)
+        axes.text(bounds["upper-bound"], len(played) - 0.4, "upper bound ", color=BOUND, ha="right", va="bottom", fontsize=9)
+    axes.set_yticks(range(len(played)), [f"{row['attacker']}\n({row['knowledge']})" for row in reversed(played)], fontsize=9)
+    axes.set_xlabel("mean undetected horizontal error, m (95 % interval)")
+    axes.set_title(f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}", pad=16)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    figure.savefig(path)
