@@ -5,9 +5,10 @@ unknowns the final error e and the innovations u_k are linear, and
 
     log-score(v) = log |e(v)| + Σ_k log P(χ²_m(|u_k(v)|²) <= threshold)
 
-is maximised by L-BFGS-B (Byrd, Lu, Nocedal and Zhu 1995) with its exact gradient. For a fixed direction of the error
-the log-score is concave (log of a linear function plus log-concave factors, see `survival`) on a convex set, so it has
-one maximum; only the direction can hide others, and therefore the search starts from several.
+is maximised by a truncated Newton method with bounds (Nash 1984; scipy's TNC) with its exact gradient. It agrees with
+L-BFGS-B, converges further, and calls no BLAS, whose threads slow L-BFGS-B tenfold on a busy machine. For a fixed
+direction of the error the log-score is concave (log of a linear function plus log-concave factors, see `survival`) on a
+convex set, so it has one maximum; only the direction can hide others, and therefore the search starts from several.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from spoofgym.optimum.response import azimuth_of, half_circle_sign, increment_ma
 from spoofgym.optimum.survival import check_threshold, log_survival_and_slope
 
 START_AZIMUTHS = (0.0, 45.0, 90.0, 135.0)
-GRADIENT_TOLERANCE = 1e-5
+GRADIENT_TOLERANCE = 1e-6
 """Largest projected gradient of the log-score at a solution, per metre of increment."""
 
 
@@ -160,9 +161,9 @@ def _climb(log_score: LogScore, start: Floats, limits: Floats) -> OptimizeResult
         log_score.loss,
         start,
         jac=True,
-        method="L-BFGS-B",
+        method="TNC",
         bounds=np.stack((-limits, limits), axis=1),
-        options={"maxiter": 20000, "maxfun": 40000, "ftol": 0.0, "gtol": 0.1 * GRADIENT_TOLERANCE, "maxcor": 30},
+        options={"maxfun": 40000, "ftol": 0.0, "xtol": 0.0, "gtol": 0.1 * GRADIENT_TOLERANCE},
     )
 
 

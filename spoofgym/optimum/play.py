@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from spoofgym.arrays import Floats
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_STATES
-from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.survival import check_threshold, evaluate
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
-from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.arrays import Floats
+from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.play import HORIZONTAL
 
@@ -97,7 +96,9 @@ def increment_maps(model: LinearModel) -> tuple[Floats, Floats]:
         deviation = offset if dimension == 3 else np.vstack((offset, increment / (model.time[k] - model.time[k - 1])))
         error = model.transition[k] @ error
         residual = model.observation[k] @ error[:9] - deviation
-        whitened[k - 1] = solve_triangular(model.innovation_factor[k], residual, lower=True)
+        factor = model.innovation_factor[k]
+        for a in range(dimension):  # forward substitution: a LAPACK call for 3 rows costs more than it computes
+            whitened[k - 1, a] = (residual[a] - factor[a, :a] @ whitened[k - 1, :a]) / factor[a, a]
         error -= model.whitened_gain[k] @ whitened[k - 1]
     return whitened.reshape(num_epochs * dimension, num_epochs * 3), error[HORIZONTAL]
 
