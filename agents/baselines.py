@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from agents.scripted import OffsetSequence, RandomRates
+from spoofgym.arrays import Floats
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot
 from spoofgym.evaluation.metrics import undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes
-from spoofgym.arrays import Floats
 from spoofgym.optimum import best_budget, best_ramp, bounded_optimum, noncentrality_optimum, upper_bound
 from spoofgym.scenario import Scenario
 
@@ -42,7 +42,7 @@ class Baseline:
 
 
 def exact_threshold(scenario: Scenario, detectors: list[Detector]) -> float | None:
-    """The threshold of the game where exact values exist: a matched filter against the snapshot test alone; else None."""
+    """The threshold where exact values exist, a matched filter against the snapshot test alone; else None."""
     if scenario.matched and len(detectors) == 1 and isinstance(detectors[0], Snapshot) and scenario.dimension == 3:
         return detectors[0].threshold
     return None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spoofgym.attacks.base import Attack
 from spoofgym.arrays import Floats, Runs
+from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.streams import RunStreams
 

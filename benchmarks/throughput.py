@@ -3,8 +3,9 @@
     python -m benchmarks.throughput                # a table
     python -m benchmarks.throughput --json -       # JSON to stdout
 
-Measure on an idle machine. Actions are uniformly random, so that most games end by an alarm after some 25 epochs and resets weigh
-heavily, as at the start of training; rows "ramp" play an attack that mostly reaches the end, as a trained spoofer does.
+Measure on an idle machine. Actions are uniformly random, so that most games end by an alarm after some 25 epochs and
+resets weigh heavily, as at the start of training; rows "ramp" play an attack that mostly reaches the end, as a trained
+spoofer does.
 """
 
 from __future__ import annotations
@@ -134,7 +135,8 @@ def measure() -> Iterable[dict[str, Any]]:
     """All rows, one after the other."""
     for fidelity in ("linear", "strapdown"):
         own = "shared" if fidelity == "linear" else "own"
-        yield _row("random", fidelity, "single", 1, 1, own, single_rate(gym.make("spoofgym/Spoofer-v0", fidelity=fidelity), "random"))
+        single = gym.make("spoofgym/Spoofer-v0", fidelity=fidelity)
+        yield _row("random", fidelity, "single", 1, 1, own, single_rate(single, "random"))
         for num_envs in NUM_ENVS:
             for threads in (1, 2):
                 for play in ("random", "ramp"):
@@ -161,8 +163,8 @@ def main() -> int:
     for row in measure():
         rows.append(row)
         line = (
-            f"{row['what']:<26}{row['fidelity']:<11}{row['mode']:<8}{row['num_envs']:>5} envs  {row['threads']} threads  "
-            f"{row['gains']:<7}{row['steps_per_second']:>12,.0f} steps/s"
+            f"{row['what']:<26}{row['fidelity']:<11}{row['mode']:<8}{row['num_envs']:>5} envs  "
+            f"{row['threads']} threads  {row['gains']:<7}{row['steps_per_second']:>12,.0f} steps/s"
         )
         print(line, file=sys.stderr if options.json == "-" else sys.stdout, flush=True)
     with_package, without = import_seconds()

@@ -1,8 +1,8 @@
 """WGS-84: the ellipsoid, gravity, the rotation of the Earth and of the navigation frame, and conversions of position.
 
 A position is (latitude rad, longitude rad, ellipsoidal height m). Vectors are east, north, up (ENU). The functions a
-kernel needs are compiled and take and return scalars; the others wrap pymap3d and work on arrays of any leading shape. The kernels divide
-as NumPy does (no ZeroDivisionError, which would keep the compiler from inlining them and costs a third of the speed).
+kernel needs are compiled and take and return scalars; the others wrap pymap3d and work on arrays of any leading shape.
+Kernels divide as NumPy does: without ZeroDivisionError the compiler inlines them, which saves a third of the time.
 """
 
 from __future__ import annotations

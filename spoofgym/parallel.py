@@ -15,8 +15,8 @@ from spoofgym.arrays import Runs
 class RunSlices:
     """Calls a function on slices of the runs, one per thread.
 
-    The pool is made when first needed, anew after a fork, and is never pickled. Results do not depend on the number of threads, because
-    no run's arithmetic depends on another's.
+    The pool is made when first needed, anew after a fork, and is never pickled. Results do not depend on the number of
+    threads, because no run's arithmetic depends on another's.
     """
 
     def __init__(self, threads: int = 1) -> None:

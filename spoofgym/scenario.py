@@ -8,8 +8,8 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from spoofgym.geodesy import position_difference
 from spoofgym.arrays import Floats, Runs
+from spoofgym.geodesy import position_difference
 from spoofgym.navigation.interface import Navigator, Timeline
 from spoofgym.navigation.linear import LinearNavigator, OwnCovarianceNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
@@ -37,6 +37,7 @@ class Scenario(ABC):
         error_scale: metres of navigation error that make a reward of 1.
         fidelities: the valid ones.
         matched: whether the filter's model is the truth, so that clean innovations are white.
+        random: whether every episode is drawn anew; a recorded log has one realisation.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Scenario(ABC):
     error_scale: float
     fidelities: tuple[str, ...] = FIDELITIES
     matched: bool
+    random: bool = True
 
     @abstractmethod
     def times(self, burn_in: int) -> Floats:

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.interface import Clock, Decision, Epoch, Innovation
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
@@ -82,6 +82,7 @@ class Simulation:
         excludes = response is not None and response.excludes
         self.navigator = scenario.navigator(fidelity, excludes, self.burn_in, num_runs, RunSlices(threads))
         self._times = scenario.times(self.burn_in)
+        self._intervals = np.diff(self._times, prepend=self._times[0] - scenario.timeline.interval)
         self._noise = np.zeros((num_runs, len(self._times), scenario.dimension))
         self._all = np.arange(num_runs)
         self._decision = Decision(np.ones(num_runs, dtype=bool))
@@ -135,7 +136,7 @@ class Simulation:
         pending = np.arange(len(runs))
         for _ in range(MAX_REDRAWS):
             pending = pending[self._burn_in(runs[pending], pending, bank)]
-            if len(pending) == 0:
+            if len(pending) == 0 or not self.scenario.random:
                 return bank
         raise RuntimeError(f"{len(pending)} runs alarm in every clean burn-in: the thresholds are far too low")
 
@@ -243,7 +244,7 @@ class Simulation:
         deviation = self._noise[self._all, following]
         deviation[:, :3] += offset
         if self.scenario.dimension == 6:
-            deviation[:, 3:] += (offset - self.offset) / self.scenario.timeline.interval
+            deviation[:, 3:] += (offset - self.offset) / self._intervals[following, None]
         self.offset = np.array(offset, dtype=np.float64)
         navigator.propagate()
         epoch = Epoch(clock.index, clock.time, navigator.innovate(deviation))

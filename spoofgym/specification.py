@@ -1,7 +1,8 @@
 """The one spelling of a part: ``name[:value][,key=value...]``.
 
-Command line, environment arguments, opponent pools, tables and files all name a detector, an attack, a response or a scenario this
-way: ``snapshot``, ``windowed:n=20,arl0=1e5``, ``ramp:0.5,direction=135``, ``recorded:PATH,grade=tactical``.
+Command line, environment arguments, opponent pools, tables and files all name a detector, an attack, a response or a
+scenario this way: ``snapshot``, ``windowed:n=20,arl0=1e5``, ``ramp:0.5,direction=135``,
+``recorded:PATH,grade=tactical``.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class Specification:
         """Read ``name[:value][,key=value...]``; blanks around a piece do not count.
 
         Raises:
-            ValueError: empty name or piece, a key given twice, or a piece that is neither the first value nor ``key=value``.
+            ValueError: empty name or piece, a key given twice, or a piece that is neither the first value nor
+                ``key=value``.
         """
         name, separator, rest = text.strip().partition(":")
         if "," in name:
@@ -59,7 +61,8 @@ class Specification:
         return cls(name, value, options)
 
     def __str__(self) -> str:
-        pieces = ([] if self.value is None else [self.value]) + [f"{key}={value}" for key, value in self.options.items()]
+        pieces = [] if self.value is None else [self.value]
+        pieces += [f"{key}={value}" for key, value in self.options.items()]
         return self.name + (":" + ",".join(pieces) if pieces else "")
 
 
@@ -84,8 +87,8 @@ def _write(content: object) -> str:
 def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> Part:
     """Make the part that a specification names.
 
-    The value fills the factory's first parameter, options fill the others by name; strings are converted by the parameter's annotation
-    (``float``, ``int``, ``bool``, ``str``, or one of them ``| None``).
+    The value fills the factory's first parameter, options fill the others by name; strings are converted by the
+    parameter's annotation (``float``, ``int``, ``bool``, ``str``, or one of them ``| None``).
 
     Args:
         text: the specification.
@@ -93,8 +96,12 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
         kind: what is built, for error messages ("detector", "attack", ...).
 
     Raises:
+        TypeError: not a text.
         ValueError: unknown name or option (the message lists the valid ones), or a value of the wrong type.
     """
+    if not isinstance(text, str):
+        valid = ", ".join(sorted(registry))
+        raise TypeError(f"{kind} must be a specification ({valid}) or an object of its class, got {text!r}")
     specification = Specification.parse(text)
     if specification.name not in registry:
         raise ValueError(f"unknown {kind} {specification.name!r}; valid names: {', '.join(sorted(registry))}")
@@ -115,25 +122,9 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
         raise ValueError(f"{kind} {specification.name!r} has no option {unknown[0]!r}; valid options: {valid}")
     missing = [p.name for p in parameters.values() if p.default is inspect.Parameter.empty and p.name not in arguments]
     if missing:
-        raise ValueError(f"{kind} {specification.name!r} needs {missing[0]!r}, e.g. {specification.name}:{missing[0]}=...")
+        example = f"{specification.name}:{missing[0]}=..."
+        raise ValueError(f"{kind} {specification.name!r} needs {missing[0]!r}, e.g. {example}")
     return factory(**{key: _convert(text, key, value, hints.get(key, str)) for key, value in arguments.items()})
-
-
-def part_of(spec_or_object: object, registry: Mapping[str, Callable[..., Part]], kind: str, base: type) -> Part:
-    """The part itself if it is one already, else the part that the specification names.
-
-    Raises:
-        ValueError: as `build`.
-        TypeError: neither a specification nor an instance of ``base``.
-    """
-    if isinstance(spec_or_object, base):
-        return spec_or_object
-    if isinstance(spec_or_object, str):
-        return build(spec_or_object, registry, kind)
-    raise TypeError(
-        f"{kind} must be a specification (one of {', '.join(sorted(registry))}, with options) or a {base.__name__}, "
-        f"got {spec_or_object!r}"
-    )
 
 
 def _convert(text: str, key: str, value: str, annotation: Any) -> Any:

@@ -1,13 +1,14 @@
 """Random streams: one generator per run and purpose.
 
-Run i of a batch draws from children of its own generator only, so that it is bit-identical for any number of runs and threads. The
-purposes are separate streams and every episode takes blocks of a fixed size from them, so that two attackers on the same seed meet
-the same noise, in this episode and in the later ones.
+Run i of a batch draws from children of its own generator only, so that it is bit-identical for any number of runs and
+threads. The purposes are separate streams and every episode takes blocks of a fixed size from them, so that two
+attackers on the same seed meet the same noise, in this episode and in the later ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -17,7 +18,8 @@ PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory")
 class RunStreams:
     """The generators of a batch of runs, made when first asked for.
 
-    A child depends on its parent's seed sequence and its purpose alone, never on the order in which children are asked for.
+    A child depends on its parent's seed sequence and its purpose alone, never on the order in which children are asked
+    for. It is the child that ``spawn`` would give at the purpose's place, so nobody else spawns from these parents.
     """
 
     def __init__(self, parents: Sequence[np.random.Generator]) -> None:
@@ -57,8 +59,9 @@ class RunStreams:
         child = self._children.get((run, purpose))
         if child is None:
             if purpose not in PURPOSES:
-                raise ValueError(f"unknown purpose {purpose!r} of a random stream; valid purposes: {', '.join(PURPOSES)}")
-            sequence = self._parents[run].bit_generator.seed_seq
+                valid = ", ".join(PURPOSES)
+                raise ValueError(f"unknown purpose {purpose!r} of a random stream; valid purposes: {valid}")
+            sequence = cast(np.random.SeedSequence, self._parents[run].bit_generator.seed_seq)
             key = (*sequence.spawn_key, PURPOSES.index(purpose))
             child = np.random.Generator(np.random.PCG64(np.random.SeedSequence(sequence.entropy, spawn_key=key)))
             self._children[run, purpose] = child

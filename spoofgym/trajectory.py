@@ -1,8 +1,8 @@
 """True motion from a list of manoeuvres, smooth to jerk, with the inertial measurements that belong to it.
 
-Each manoeuvre changes one thing (speed, height or heading) from rest to rest by the seventh-order step, whose first three
-derivatives vanish at both ends: acceleration and jerk are continuous where manoeuvres meet, and so are roll rate and pitch
-rate. Turns are coordinated (bank from speed and turn rate), pitch is the climb angle, and there is no sideslip.
+Each manoeuvre changes one thing (speed, height or heading) from rest to rest by the seventh-order step, whose first
+three derivatives vanish at both ends: acceleration and jerk are continuous where manoeuvres meet, and so are roll rate
+and pitch rate. Turns are coordinated (bank from speed and turn rate), pitch is the climb angle, without sideslip.
 """
 
 from __future__ import annotations
@@ -194,11 +194,14 @@ def fly(
         The trajectory; mechanizing its measurements from its first state reproduces it to rounding.
 
     Raises:
-        ValueError: No manoeuvre, all together shorter than one IMU interval, a position that is none, a speed that is not
-            positive or is slowed to zero, a climb steeper than the speed allows, or a value that is not finite.
+        ValueError: No manoeuvre, all together shorter than one IMU interval, a position that is none, a speed that is
+            not positive or is slowed to zero, a climb steeper than the speed allows, or a value that is not finite.
     """
     if len(manoeuvres) == 0:
         raise ValueError("manoeuvres is empty: give at least one of Straight, Accelerate, Climb, Turn")
+    for item in manoeuvres:
+        if not isinstance(item, Manoeuvre):
+            raise ValueError(f"a manoeuvre is one of Straight, Accelerate, Climb, Turn, got {item!r}")
     _require_positive("speed", speed)
     _require_positive("rate", rate)
     _require_finite("heading", heading)
@@ -258,8 +261,6 @@ def _profiles(
         elif isinstance(item, Turn):
             heading_along += item.angle * smooth_step(fraction)
             turn_rate += item.angle / item.duration * smooth_step_rate(fraction)
-        elif not isinstance(item, Straight):
-            raise ValueError(f"a manoeuvre is one of Straight, Accelerate, Climb, Turn, got {item!r}")
         begin += item.duration
     return path_speed, climb_rate, heading_along, turn_rate
 
@@ -282,7 +283,9 @@ def _integrate_position(
 def _start(position: ArrayLike) -> NDArray[np.float64]:
     start = np.array(position, dtype=np.float64)
     if start.shape != (3,) or not np.all(np.isfinite(start)):
-        raise ValueError(f"position must be three finite numbers (latitude rad, longitude rad, height m), got {position!r}")
+        raise ValueError(
+            f"position must be three finite numbers (latitude rad, longitude rad, height m), got {position!r}"
+        )
     if abs(start[0]) > MAX_LATITUDE:
         raise ValueError(
             f"latitude must lie within +-{MAX_LATITUDE:.4f} rad, got {start[0]:.6g}: are these degrees or is it a pole?"

@@ -107,7 +107,7 @@ class Evaluation:
         return play_policy(make, policy.act, self.episodes, self.seed)
 
     def _exact(self, policy: LearnedSpoofer) -> float | None:
-        """Exact undetected error of a policy whose offsets do not depend on chance: blind or shadow, without tracking error."""
+        """Exact undetected error of a policy whose offsets do not depend on chance; else None."""
         if self.threshold is None or policy.config.knowledge == "full" or policy.config.tracking_sigma:
             return None
         offsets = offsets_without_chance(self._game(policy, 1), policy.act)

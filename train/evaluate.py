@@ -3,8 +3,9 @@
     python -m train.evaluate --scenario liu-flight --detector snapshot --attacker runs/x --seed 0 --json out.json
     python -m train.evaluate --scenario recorded:FOLDER --attack ramp:0.5 --detector snapshot --json -
 
-The baselines are always evaluated: none, random, the best constant ramp, the closed form, the optimum, and the upper bound as a figure.
-Every attacker meets the same noise. A table goes to the terminal, a figure and JSON where asked; ``--json -`` prints JSON alone.
+The baselines are always evaluated: none, random, the best constant ramp, the closed form, the optimum, and the upper
+bound as a figure. Every attacker meets the same noise. A table goes to the terminal, a figure and JSON where asked;
+``--json -`` prints JSON alone.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from spoofgym.evaluation.recorded import evaluate_recorded
 
 from agents.baselines import exact_threshold
 from agents.learned import LearnedSpoofer
@@ -23,7 +25,6 @@ from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
 from spoofgym.scenario import FIDELITIES, Scenario
 from spoofgym.scenarios import make_scenario
@@ -38,18 +39,20 @@ EPISODES = {"linear": 20_000, "strapdown": 1_000}
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = argparse.ArgumentParser(
-        prog="python -m train.evaluate", description="Evaluate spoofers against a detector, beside baselines and the exact optimum."
+        prog="python -m train.evaluate",
+        description="Evaluate spoofers against a detector, beside baselines and the exact optimum.",
     )
-    result.add_argument("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
-    result.add_argument("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
-    result.add_argument("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
-    result.add_argument("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
-    result.add_argument("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
-    result.add_argument("--episodes", type=count, help="games of each attacker (default: 20000 linear, 1000 strapdown)")
-    result.add_argument("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
-    result.add_argument("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
-    result.add_argument("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
-    result.add_argument("--figure", type=Path, help="write a figure (PNG, SVG or PDF by its ending)")
+    add = result.add_argument
+    add("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
+    add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
+    add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
+    add("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
+    add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
+    add("--episodes", type=count, help="games of each attacker (default: 20000 linear, 1000 strapdown)")
+    add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
+    add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
+    add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
+    add("--figure", type=Path, help="write a figure (PNG, SVG or PDF by its ending)")
     return result
 
 

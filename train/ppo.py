@@ -1,7 +1,7 @@
 """PPO on the native vector environment: its settings, its checkpoints, and what it leaves behind.
 
-A minibatch of SB3's default size trains at 4,000 steps/s, one of a few thousand at 30,000 and more: the update is the cost, so the
-rollout is one whole game of many lanes, cut into a few large minibatches.
+A minibatch of SB3's default size trains at 4,000 steps/s, one of a few thousand at 30,000 and more: the update is the
+cost, so the rollout is one whole game of many lanes, cut into a few large minibatches.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from agents.learned import CONFIG_FILE, LearnedSpoofer
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import SpooferVectorEnv
+from train.expected_alarm import ExpectedAlarmVectorEnv, alarm_probability_is_known
 
 CHECKPOINT_FILE = "checkpoint.pt"
 
@@ -59,7 +60,7 @@ def environment_arguments(config: SpooferConfig) -> dict[str, Any]:
 
 def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: Path) -> PPO:
     """A PPO learner on ``settings.lanes`` lanes of the game, seeded; TensorBoard writes into ``folder``."""
-    vector = SpooferVectorEnv(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
+    vector = _lanes(config, settings.lanes)
     horizon = vector.game.scenario.timeline.num_epochs
     environment = VecMonitor(SB3VecEnv(vector))
     return PPO(
@@ -68,7 +69,7 @@ def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: P
         n_steps=horizon,
         batch_size=max(1, settings.lanes * horizon // settings.minibatches),
         n_epochs=settings.epochs,
-        learning_rate=lambda remaining: settings.learning_rate * remaining,
+        learning_rate=lambda remaining: settings.learning_rate * max(remaining, 0.0),  # the last rollout may overshoot
         gamma=1.0,
         gae_lambda=settings.gae_lambda,
         clip_range=settings.clip_range,
@@ -77,6 +78,13 @@ def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: P
         seed=seed,
         device="cpu",
     )
+
+
+def _lanes(config: SpooferConfig, lanes: int) -> SpooferVectorEnv:
+    """The game, with alarms in expectation where their probability is known."""
+    if alarm_probability_is_known(config):
+        return ExpectedAlarmVectorEnv(lanes, config, autoreset_mode=AutoresetMode.SAME_STEP)
+    return SpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
 
 
 def write_config(folder: Path, config: SpooferConfig, settings: Settings, seed: int, steps: int) -> None:

@@ -25,8 +25,8 @@ def attackers_table(report: dict[str, Any]) -> Table:
     threshold = f", threshold {detector['threshold']:.4g}" if detector["threshold"] else ""
     table = Table(
         title=f"{report['scenario']}, {report['fidelity']}, {detector['name']}{threshold}{arl0}",
-        caption="error: mean undetected horizontal error with 95 % interval; median: time by which half of the games had an "
-        "alarm; at alarm: mean error then; exact: without simulation",
+        caption="error: mean undetected horizontal error with 95 % interval; median: time by which half of the games "
+        "had an alarm; at alarm: mean error then; exact: without simulation",
         box=SIMPLE_HEAD,
     )
     table.add_column("attacker", no_wrap=True)
@@ -114,10 +114,12 @@ def attackers_figure(report: dict[str, Any], path: Path) -> None:
             color="white" if inside else "black",
             fontsize=9,
         )
-    if bounds.get("upper-bound") is not None:
-        axes.axvline(bounds["upper-bound"], color=BOUND, linestyle="--", linewidth=1.2)
-        axes.text(bounds["upper-bound"], len(played) - 0.4, "upper bound ", color=BOUND, ha="right", va="bottom", fontsize=9)
-    axes.set_yticks(range(len(played)), [f"{row['attacker']}\n({row['knowledge']})" for row in reversed(played)], fontsize=9)
+    bound = bounds.get("upper-bound")
+    if bound is not None:
+        axes.axvline(bound, color=BOUND, linestyle="--", linewidth=1.2)
+        axes.text(bound, len(played) - 0.4, "upper bound ", color=BOUND, ha="right", va="bottom", fontsize=9)
+    labels = [f"{row['attacker']}\n({row['knowledge']})" for row in reversed(played)]
+    axes.set_yticks(range(len(played)), labels, fontsize=9)
     axes.set_xlabel("mean undetected horizontal error, m (95 % interval)")
     axes.set_title(f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}", pad=16)
     for side in ("top", "right"):

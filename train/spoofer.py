@@ -1,9 +1,11 @@
 """Train a PPO spoofer.
 
-    python -m train.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --steps 4000000 --seed 0 --out runs/x
+    python -m train.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --steps 4000000 --seed 0 --out
+    runs/x
 
-Writes into the run folder: the policy (``policy.npz``, arrays only), what it was trained on (``config.json``), TensorBoard logs, and
-checkpoints from which ``--resume`` goes on. Ctrl-C stops after the present step and leaves a usable policy.
+Writes into the run folder: the policy (``policy.npz``, arrays only), what it was trained on (``config.json``),
+TensorBoard logs, and checkpoints from which ``--resume`` goes on. Ctrl-C stops after the present step and leaves a
+usable policy.
 """
 
 from __future__ import annotations
@@ -34,16 +36,17 @@ def parser() -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog="python -m train.spoofer", description="Train a PPO spoofer against a detector on a real INS/GNSS filter."
     )
-    result.add_argument("--scenario", default="liu-flight", help="what is flown (default: %(default)s)")
-    result.add_argument("--detector", default="snapshot", help="the monitor, e.g. snapshot, windowed:n=20 (default: %(default)s)")
-    result.add_argument("--knowledge", default="shadow", choices=KNOWLEDGE, help="of the victim (default: %(default)s)")
-    result.add_argument("--action", default="rate", choices=ACTIONS, help="what the policy controls (default: %(default)s)")
-    result.add_argument("--fidelity", default="linear", choices=FIDELITIES, help="of the simulation (default: %(default)s)")
-    result.add_argument("--steps", type=count, default=DEFAULT_STEPS, help="GNSS epochs to play (default: %(default)s)")
-    result.add_argument("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
-    result.add_argument("--out", type=Path, default=Path("runs/spoofer"), help="run folder (default: %(default)s)")
-    result.add_argument("--threads", type=count, default=2, help="of the learner and the simulation (default: %(default)s)")
-    result.add_argument("--resume", action="store_true", help="go on from the checkpoint in the run folder")
+    add = result.add_argument
+    add("--scenario", default="liu-flight", help="what is flown (default: %(default)s)")
+    add("--detector", default="snapshot", help="snapshot, windowed:n=20, ... (default: %(default)s)")
+    add("--knowledge", default="shadow", choices=KNOWLEDGE, help="of the victim (default: %(default)s)")
+    add("--action", default="rate", choices=ACTIONS, help="what the policy controls (default: %(default)s)")
+    add("--fidelity", default="linear", choices=FIDELITIES, help="of the simulation (default: %(default)s)")
+    add("--steps", type=count, default=DEFAULT_STEPS, help="GNSS epochs to play (default: %(default)s)")
+    add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
+    add("--out", type=Path, default=Path("runs/spoofer"), help="run folder (default: %(default)s)")
+    add("--threads", type=count, default=2, help="of the learner and the simulation (default: %(default)s)")
+    add("--resume", action="store_true", help="go on from the checkpoint in the run folder")
     return result
 
 

@@ -63,9 +63,11 @@ class SpooferConfig:
         require("action", self.action, ACTIONS)
         require("on_alarm", self.on_alarm, ON_ALARM)
         if self.action == "innovation" and self.knowledge == "blind":
-            raise ValueError("action 'innovation' runs a shadow filter: knowledge must be 'shadow' or 'full', not 'blind'")
-        if not 0 <= self.forfeit:
-            raise ValueError(f"forfeit must be 0 or more, got {self.forfeit}")
+            raise ValueError(
+                "action 'innovation' runs a shadow filter: knowledge must be 'shadow' or 'full', not 'blind'"
+            )
+        if not 0 <= self.forfeit < float("inf"):
+            raise ValueError(f"forfeit must be 0 or more and finite, got {self.forfeit}")
         if not 0 <= self.tracking_sigma < float("inf"):
             raise ValueError(f"tracking_sigma must be 0 or more metres, got {self.tracking_sigma}")
         if self.threads < 1:

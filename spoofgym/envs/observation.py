@@ -1,6 +1,7 @@
 """What the spoofer sees, by its knowledge of the victim: the fields, their order and their scale.
 
-Every entry is squashed smoothly into (-1, 1) by x / (1 + |x|), x being the quantity over its scale, except the elapsed fraction.
+Every entry is squashed smoothly into (-1, 1) by x / (1 + |x|), x being the quantity over its scale, except the elapsed
+fraction.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class Squash:
         self._plain = np.array([field.scale == 0 for field in fields])
 
     def __call__(self, raw: Floats) -> NDArray[np.float32]:
-        """x / (1 + |x|), (N, D); raw is overwritten in its squashed entries."""
+        """X / (1 + |x|), (N, D); raw is overwritten in its squashed entries."""
         scaled = raw * self._inverse
         squashed = scaled / (1.0 + np.abs(scaled))
         squashed[:, self._plain] = raw[:, self._plain]

@@ -12,8 +12,14 @@ if TYPE_CHECKING:
     from spoofgym.envs.spoofer_game import SpooferGame
 
 TRUE, ESTIMATED, SPOOFED = "#4d4d4d", "#0072b2", "#d55e00"
-SHARE_OF_TRACK = 0.15
-"""Largest deviation in the ground track, as a share of its extent: deviations are magnified to it where they are smaller."""
+STATISTICS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+ALARM, SAFE = "#c1121f", "#2b7a3d"
+SHARE_OF_TRACK = 0.2
+"""Largest deviation in the ground track, as a share of its extent: smaller deviations are magnified up to it."""
+LEAST_DEVIATION = 30.0
+"""Deviations are not magnified as if they were smaller than this, m: noise stays small in the drawing."""
+LARGEST_LINEAR = 5.0
+"""Statistics over their thresholds are drawn on a logarithmic scale where one exceeds this."""
 ROUND_FACTORS = np.array([1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000])
 
 
@@ -32,9 +38,10 @@ class SpooferFigure:
         except ImportError as error:
             raise DependencyNotInstalled("rendering needs matplotlib: pip install 'spoofgym[render]'") from error
         self._game = game
-        self._figure = Figure(figsize=(9.6, 5.4), dpi=100, layout="constrained")
+        self._figure = Figure(figsize=(9.6, 5.4), dpi=100)
         self._canvas = FigureCanvasAgg(self._figure)
         self._track = game.scenario.track()
+        self._names = list(game.simulation.detectors)
         self.restart()
 
     def restart(self) -> None:
@@ -53,10 +60,13 @@ class SpooferFigure:
         """The figure so far, (540, 960, 3)."""
         rows = np.array(self._rows)
         self._figure.clear()
-        grid = self._figure.add_gridspec(2, 2, width_ratios=(1.0, 1.25))
-        self._draw_track(self._figure.add_subplot(grid[:, 0]), rows)
-        self._draw_error(self._figure.add_subplot(grid[0, 1]), rows)
-        self._draw_statistics(self._figure.add_subplot(grid[1, 1]), rows)
+        # fixed places: a layout engine would move the panels from frame to frame
+        upper = self._figure.add_axes((0.53, 0.555, 0.445, 0.315))
+        self._draw_track(self._figure.add_axes((0.075, 0.235, 0.36, 0.635)), rows)
+        self._draw_error(upper, rows)
+        self._draw_statistics(self._figure.add_axes((0.53, 0.105, 0.445, 0.335), sharex=upper), rows)
+        upper.tick_params(labelbottom=False)
+        self._draw_headline(rows)
         self._canvas.draw()
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
 
@@ -64,43 +74,76 @@ class SpooferFigure:
         """Free what was drawn."""
         self._figure.clear()
 
+    def _draw_headline(self, rows: NDArray[np.float64]) -> None:
+        epoch, horizon = len(rows) - 1, self._game.scenario.timeline.num_epochs
+        alarms = rows[1:, 5:] > 1  # epoch 0 is clean and does not count
+        if alarms.any():
+            first = int(np.argmax(alarms.any(axis=1)))
+            who = " and ".join(name for name, alarm in zip(self._names, alarms[first], strict=True) if alarm)
+            verdict, colour = f"DETECTED at epoch {first + 1} by {who}", ALARM
+        else:
+            verdict, colour = "undetected to the end" if epoch == horizon else "not detected so far", SAFE
+        error = np.hypot(rows[-1, 1], rows[-1, 2])
+        text = f"Epoch {epoch} of {horizon}: navigation error {error:.1f} m, {verdict}"
+        self._figure.suptitle(text, color=colour, fontsize=13, fontweight="bold", y=0.975)
+
     def _draw_track(self, axes: Any, rows: NDArray[np.float64]) -> None:
-        track = self._track[: len(rows), :2]
-        extent = max(float(np.ptp(self._track[:, :2], axis=0).max()), 1.0)
-        largest = max(float(np.abs(rows[:, 1:5]).max()), 1e-3)
-        factor = int(ROUND_FACTORS[np.searchsorted(ROUND_FACTORS, SHARE_OF_TRACK * extent / largest, side="right") - 1])
-        factor = max(factor, 1)
-        lines = ((np.zeros_like(track), "true", TRUE), (rows[:, 3:5], "spoofed", SPOOFED), (rows[:, 1:3], "estimated", ESTIMATED))
-        for deviation, label, colour in lines:
-            east, north = ((track + factor * deviation) / 1000.0).T
-            axes.plot(east, north, color=colour, label=label, linewidth=2 if label != "true" else 1.5)
+        whole = self._track[:, :2]
+        extent = max(float(np.ptp(whole, axis=0).max()), 1.0)
+        largest = max(float(np.abs(rows[:, 1:5]).max()), LEAST_DEVIATION)
+        place = int(np.searchsorted(ROUND_FACTORS, SHARE_OF_TRACK * extent / largest, side="right"))
+        factor = int(ROUND_FACTORS[max(place - 1, 0)])
+        axes.plot(*(whole / 1000.0).T, color="0.8", linewidth=1, linestyle=":", label="true, still to come")
+        lines = (
+            (np.zeros((len(rows), 2)), "true", TRUE, 1.5),
+            (rows[:, 3:5], "told by the spoofed fixes", SPOOFED, 2.0),
+            (rows[:, 1:3], "estimated by the filter", ESTIMATED, 2.0),
+        )
+        for deviation, label, colour, width in lines:
+            east, north = ((whole[: len(rows)] + factor * deviation) / 1000.0).T
+            axes.plot(east, north, color=colour, label=label, linewidth=width)
             axes.plot(east[-1], north[-1], "o", color=colour, markersize=6)
-        centre = (self._track[:, :2].min(axis=0) + self._track[:, :2].max(axis=0)) / 2000.0
-        half = 0.65 * extent / 1000.0
+        centre = (whole.min(axis=0) + whole.max(axis=0)) / 2000.0
+        half = 0.8 * extent / 1000.0
         axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half), aspect="equal")
         axes.set(xlabel="east, km", ylabel="north, km")
-        axes.set_title("Ground track" + (f", deviations drawn x {factor}" if factor > 1 else ""))
-        axes.legend(loc="best", frameon=False)
+        axes.set_title("Ground track" + (f", deviations × {factor}" if factor > 1 else ""))
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), frameon=False, fontsize=9, ncols=2)
 
     def _draw_error(self, axes: Any, rows: NDArray[np.float64]) -> None:
         time = rows[:, 0] - rows[0, 0]
-        axes.plot(time, np.hypot(rows[:, 3], rows[:, 4]), color=SPOOFED, label="spoofed offset")
-        axes.plot(time, np.hypot(rows[:, 1], rows[:, 2]), color=ESTIMATED, label="error of the estimate", linewidth=2)
+        offset, error = np.hypot(rows[:, 3], rows[:, 4]), np.hypot(rows[:, 1], rows[:, 2])
+        for values, label, colour in (
+            (offset, "offset of the spoofed fix", SPOOFED),
+            (error, "error of the estimate", ESTIMATED),
+        ):
+            axes.plot(time, values, color=colour, label=label, linewidth=2)
+            axes.plot(time[-1], values[-1], "o", color=colour, markersize=5, clip_on=False, zorder=3)
         axes.set(xlim=(0, self._duration()), ylabel="horizontal, m", title="Navigation error")
-        axes.set_ylim(bottom=0)
-        axes.legend(loc="upper left", frameon=False)
+        axes.set_ylim(0, 1.35 * max(float(offset.max()), float(error.max()), 5.0))
+        axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=2)
 
     def _draw_statistics(self, axes: Any, rows: NDArray[np.float64]) -> None:
         time = rows[:, 0] - rows[0, 0]
-        for column, name in enumerate(self._game.simulation.detectors, start=5):
-            axes.plot(time, rows[:, column], label=name, linewidth=1.5)
-            alarms = rows[:, column] > 1
-            axes.plot(time[alarms], rows[alarms, column], "rv", markersize=8)
-        axes.axhline(1.0, color="red", linestyle="--", linewidth=1, label="alarm")
-        axes.set(xlim=(0, self._duration()), xlabel="time since the last clean fix, s", ylabel="over threshold")
-        axes.set_ylim(0, max(1.15, 1.05 * float(rows[:, 5:].max(initial=0.0))))
-        axes.set_title("Test statistic over its threshold")
-        axes.legend(loc="upper left", frameon=False, ncols=2)
+        largest = float(rows[:, 5:].max(initial=0.0))
+        if largest > LARGEST_LINEAR:
+            axes.set_yscale("log")
+            low, high = 0.01, 8.0 * largest
+        else:
+            low, high = 0.0, 1.45 * max(largest, 1.0)
+        axes.axhspan(1.0, high, color=ALARM, alpha=0.08, linewidth=0)
+        axes.axhline(1.0, color=ALARM, linestyle="--", linewidth=1, label="threshold")
+        for n, name in enumerate(self._names):
+            ratio, colour = rows[:, 5 + n], STATISTICS[n % len(STATISTICS)]
+            axes.plot(time, ratio, color=colour, label=name, linewidth=1.5)
+            axes.plot(time[-1], ratio[-1], "o", color=colour, markersize=5, clip_on=False, zorder=3)
+            alarms = 1 + np.flatnonzero(ratio[1:] > 1)[:1]
+            axes.plot(time[alarms], ratio[alarms], "X", color=ALARM, markersize=11, clip_on=False, zorder=4)
+        axes.set(xlabel="time since the last clean fix, s", ylabel="statistic / threshold", ylim=(low, high))
+        axes.set_title(
+            "Detector: alarm in the red zone" if len(self._names) < 2 else "Detectors: alarm in the red zone"
+        )
+        axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=3)
 
     def _duration(self) -> float:
         timeline = self._game.scenario.timeline

@@ -13,14 +13,16 @@ try:
     from stable_baselines3.common.vec_env import VecEnv
     from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 except ImportError as error:
-    raise gym.error.DependencyNotInstalled("the adapter needs Stable-Baselines3: pip install 'spoofgym[sb3]'") from error
+    raise gym.error.DependencyNotInstalled(
+        "the adapter needs Stable-Baselines3: pip install 'spoofgym[sb3]'"
+    ) from error
 
 
 class SB3VecEnv(VecEnv):
     """Adapter of a Gymnasium vector environment in the autoreset mode SAME_STEP.
 
-    Observations, rewards, dones, ``terminal_observation`` and ``TimeLimit.truncated`` are bit-equal to those of a `DummyVecEnv` of the
-    single environments. To keep training fast, a lane's info is filled at the end of its episode only.
+    Observations, rewards, dones, ``terminal_observation`` and ``TimeLimit.truncated`` are bit-equal to those of a
+    `DummyVecEnv` of the single environments. To keep training fast, a lane's info is filled at the end of its episode only.
 
     Attributes:
         vector_env: the environment that is adapted.
@@ -37,9 +39,7 @@ class SB3VecEnv(VecEnv):
             raise ValueError(f"the vector environment must have autoreset_mode={AutoresetMode.SAME_STEP}, got {mode}")
         self.vector_env = vector_env
         self._actions: Any = None
-        super().__init__(
-            vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space
-        )
+        super().__init__(vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space)
 
     def reset(self) -> VecEnvObs:
         """Start new episodes in all lanes; seeds given by `seed` are used once."""

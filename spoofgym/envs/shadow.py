@@ -1,6 +1,7 @@
 """The spoofer's copy of the victim's filter, run in expectation.
 
-Liu 2018, eqs 32-34: with the gains of the filter known, the mean error and the mean innovation follow from the offsets alone,
+Liu 2018, eqs 32-34: with the gains of the filter known, the mean error and the mean innovation follow from the offsets
+alone,
 
     e⁻ = Φ e,      r = H e⁻ - s,      u = L⁻¹ r,      e = e⁻ - U u.
 """
@@ -10,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.parallel import RunSlices
 
@@ -127,7 +128,7 @@ def _advance(
 def _residual(
     observation: Floats, error: Floats, offset: Floats, previous: Floats, interval: float, residual: Floats
 ) -> None:
-    """r = H e⁻ - s; a receiver that gives velocity gives the offset's rate with it."""
+    """R = H e⁻ - s; a receiver that gives velocity gives the offset's rate with it."""
     for a in range(residual.shape[0]):
         total = -offset[a] if a < 3 else -(offset[a - 3] - previous[a - 3]) / interval
         for j in range(NUM_NAVIGATION):

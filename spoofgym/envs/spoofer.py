@@ -16,7 +16,149 @@ LANE = np.zeros(1, dtype=np.int64)
 
 
 class SpooferEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    __doc__ = "SPOOFER PAGE"
+    r"""The spoofer's game: move a vehicle's GNSS position so that its navigation drifts away and no monitor notices.
+
+    ## Description
+
+    A vehicle navigates by an inertial navigation system and GNSS fixes, which a 15-state error-state Kalman filter
+    fuses. A spoofer, the agent, has taken the receiver over. At every fix (an epoch) it chooses how far the position
+    that the receiver reports lies from the true one. Fault detectors watch the filter's innovations: a fast drag-off
+    raises the alarm, a slow one moves the estimate little. The agent wants the largest horizontal error of the
+    estimate at the end of the game without an alarm on the way.
+
+    The default scenario is the flight of Liu et al. (2018): 1 fix per second, 120 epochs from 801 s on, straight and
+    level at 150 m/s, and a chi-square test of each fix with threshold 25.9. The best score there is known
+    (`spoofgym.optimum`), so that a learned policy can be reported as a fraction of it.
+
+    ```python
+    import gymnasium
+
+    env = gymnasium.make("spoofgym:spoofgym/Spoofer-v0", knowledge="shadow", render_mode="rgb_array")
+    ```
+
+    ## Action Space
+
+    `Box(-1.0, 1.0, (3,), float32)`, east, north, up; what lies outside is clipped.
+
+    - `action="rate"`: the rate at which the offset changes until the coming fix, one unit being the scenario's
+      largest drag-off rate per axis (4 m/s on the Liu flight). The offset of a fix is that of the fix before plus
+      rate times interval.
+    - `action="innovation"`: the mean whitened innovation that the coming fix is to provoke in the position axes, one
+      unit being 4 sigma. The spoofer's shadow filter turns it into the offset; there is no limit of the rate. Needs
+      `knowledge` "shadow" or "full".
+
+    ## Observation Space
+
+    `Box(float32)` with the entries below. But for the elapsed fraction, a quantity x is squashed to y / (1 + |y|), y
+    = x / scale: an entry is a half where the quantity equals its scale, and tends to ±1 for large ones. The table is
+    that of `knowledge="shadow"`, 20 entries with fixes of position.
+
+    | Index | Name | Min | Max | Unit | Scale |
+    |---|---|---|---|---|---|
+    | 0 | offset east | -1 | 1 | m | 10 |
+    | 1 | offset north | -1 | 1 | m | 10 |
+    | 2 | offset up | -1 | 1 | m | 10 |
+    | 3 | elapsed fraction of the game | 0 | 1 | 1 | not squashed |
+    | 4 | tracked velocity east | -1 | 1 | m/s | 100 |
+    | 5 | tracked velocity north | -1 | 1 | m/s | 100 |
+    | 6 | tracked velocity up | -1 | 1 | m/s | 100 |
+    | 7 | tracking sigma | -1 | 1 | m | 1 |
+    | 8 | mean whitened innovation, last, east | -1 | 1 | sigma | 2 |
+    | 9 | mean whitened innovation, last, north | -1 | 1 | sigma | 2 |
+    | 10 | mean whitened innovation, last, up | -1 | 1 | sigma | 2 |
+    | 11 | mean whitened innovation, coming, offset held, east | -1 | 1 | sigma | 2 |
+    | 12 | mean whitened innovation, coming, offset held, north | -1 | 1 | sigma | 2 |
+    | 13 | mean whitened innovation, coming, offset held, up | -1 | 1 | sigma | 2 |
+    | 14 | mean position error east | -1 | 1 | m | 10 |
+    | 15 | mean position error north | -1 | 1 | m | 10 |
+    | 16 | mean position error up | -1 | 1 | m | 10 |
+    | 17 | mean velocity error east | -1 | 1 | m/s | 1 |
+    | 18 | mean velocity error north | -1 | 1 | m/s | 1 |
+    | 19 | mean velocity error up | -1 | 1 | m/s | 1 |
+
+    - Offset: that the spoofer means to send in the present epoch. Tracked velocity: the vehicle's, as the spoofer
+      tracks it.
+    - Mean entries: the victim's filter run in expectation (Liu's eqs 32-34), with every fix used. "Last" is the
+      present epoch, "coming" the next one if the offset stays as it is; the mean errors are those after the present
+      fix is used.
+    - `knowledge="blind"` has entries 0-7 only (8 entries).
+    - `knowledge="full"` adds to the 20 the victim's own whitened innovation of the present epoch (entries 20-22,
+      scale 2 sigma) and, for each detector, its statistic over its threshold (entry 23, scale 1) and its threshold
+      (entry 24, scale 25): 25 entries with one detector, 2 more for each further one.
+    - Where the receiver gives velocity too (m = 6) every group of innovations has 6 entries instead of 3.
+
+    `spoofgym.envs.observation.spoofer_fields` gives the same list in Python, `env.unwrapped.game.fields` that of an
+    environment.
+
+    ## Rewards
+
+    The error is the horizontal norm of estimate minus truth after the fix of an epoch has been used. The reward is
+    the sum of two terms, which `info["reward_terms"]` holds:
+
+    - `growth`: growth of the error since the last step, over the scenario's `error_scale` (10 m on the Liu flight). A
+      step resolves the fix of the epoch before; the last step of an undetected game resolves its own, too.
+    - `forfeit`: at an alarm that ends the game, minus `forfeit` times all growth so far, that of this step included;
+      else 0.
+
+    So with `forfeit=1.0` the return times `error_scale` is the error at the end minus that at the start if
+    undetected, and 0 if detected.
+
+    ## Starting State
+
+    The filter is warm: its covariance is that of its own recursion up to the onset of the attack, its true error is
+    drawn from the joint distribution of truth and filter there. Detectors remember a clean stretch without an alarm.
+    `reset` ends after the clean epoch 0 (800 s on the Liu flight), whose fix has not been used yet; the offset is 0.
+    `reset` has no options.
+
+    ## Episode End
+
+    - Terminated: an alarm (with `on_alarm="end"`), or the last epoch of the scenario (120 steps on the Liu flight).
+    - Truncated: never by itself. `gymnasium.make(..., max_episode_steps=...)` sets a shorter limit.
+
+    ## Information
+
+    - `epoch`: the present epoch, 0 after `reset`.
+    - `error`: horizontal error of the estimate when last resolved, m. For scores only: no spoofer knows it.
+    - `alarm`: whether a detector alarms in this epoch (steps only).
+    - `reward_terms`: `growth` and `forfeit` (steps only).
+    - `outcome`: "detected" if any alarm was raised in the game, else "undetected" (last step of a terminated game
+      only).
+    - `is_success`: whether undetected (with `outcome` only).
+
+    ## Arguments
+
+    | Name | Default | Meaning |
+    |---|---|---|
+    | `scenario` | `"liu-flight"` | specification `name[:value][,key=value...]`, or a `Scenario` |
+    | `detector` | `"snapshot"` | specification or `Detector`, or a tuple of them; any alarm counts |
+    | `knowledge` | `"shadow"` | what the spoofer knows: "blind", "shadow" or "full" |
+    | `action` | `"rate"` | "rate" or "innovation" |
+    | `fidelity` | `"linear"` | "linear" (error states, one step per fix) or "strapdown" (IMU rate) |
+    | `on_alarm` | `"end"` | "end": an alarm ends the game; "respond": `response` decides, and the game goes on to its last epoch |
+    | `response` | `"exclude"` | specification or `Response`; used with `on_alarm="respond"` only |
+    | `forfeit` | `1.0` | share of the growth that an alarm takes back |
+    | `tracking_sigma` | `0.0` | see below, m |
+    | `threads` | `1` | threads for slices of lanes; results do not depend on it |
+    | `render_mode` | `None` | "rgb_array": one figure of ground track, error and statistics (needs `spoofgym[render]`) |
+
+    `tracking_sigma`: the spoofer knows the vehicle's position with this white error per axis and epoch, which adds to
+    the offset that it means to send, and its velocity with an independent one over the interval. It changes what is
+    sent and seen, not how it is scored.
+
+    With `on_alarm="respond"` nothing is taken back: the return times `error_scale` is the growth of the error
+    whatever was detected. The shadow filter still assumes that every fix is used.
+
+    ## Vectorized environment
+
+    `gymnasium.make_vec("spoofgym:spoofgym/Spoofer-v0", num_envs=64)` builds the native `SpooferVectorEnv`, which
+    takes the same arguments but `render_mode`, and `autoreset_mode`. Lane i is bit-identical to the single
+    environment seeded `seed + i`, for any number of lanes. `spoofgym.envs.sb3.SB3VecEnv` adapts it to
+    Stable-Baselines3.
+
+    ## Version History
+
+    - v0: first release.
+    """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
@@ -47,9 +189,7 @@ class SpooferEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._figure.restart()
         return self.game.observation()[0], {"epoch": 0, "error": float(self.game.error[0])}
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One GNSS epoch.
 
         Raises:
@@ -58,7 +198,10 @@ class SpooferEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         if not self._playing:
             raise RuntimeError("the game is over: call reset() first")
-        outcome = self.game.step(np.asarray(action, dtype=np.float64).reshape(1, -1))
+        action = np.asarray(action)
+        if action.shape != self.action_space.shape:
+            raise ValueError(f"the action must have shape {self.action_space.shape}, got {action.shape}")
+        outcome = self.game.step(action[None])
         terminated = bool(outcome.terminated[0])
         self._playing = not terminated
         if self._figure is not None:

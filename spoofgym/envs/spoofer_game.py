@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.observation import Squash, observation_space, spoofer_fields
 from spoofgym.envs.shadow import ShadowFilter
-from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.parallel import RunSlices
 from spoofgym.responses import make_response
+from spoofgym.responses.base import Response
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
 INNOVATION_UNIT = 4.0
 """One unit of the innovation action, in sigma per axis."""
-
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,14 @@ class SpooferGame:
         self.config = config
         scenario = make_scenario(config.scenario)
         given = config.detector if isinstance(config.detector, tuple | list) else (config.detector,)
-        detectors: Sequence[Detector] = [calibrated(make_detector(detector), scenario) for detector in given]
-        response = make_response(config.response) if config.on_alarm == "respond" else None
+        # copies: an object that the caller gives to two environments must not carry memories from one to the other
+        detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
+        names = [detector.name for detector in detectors]
+        if len(set(names)) < len(names):
+            raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
+        response: Response | None = deepcopy(make_response(config.response))
+        if config.on_alarm == "end":
+            response = None
         self.simulation = Simulation(
             scenario, None, detectors, response, num_lanes, fidelity=config.fidelity, threads=config.threads
         )

@@ -21,8 +21,8 @@ Observations = NDArray[np.float32]
 class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """N lanes of Spoofer-v0, each bit-identical to the single environment seeded ``seed + i``.
 
-    Observations, rewards, ends and infos are those of a `gymnasium.vector.SyncVectorEnv` of single environments, in all three autoreset
-    modes. Lanes do not depend on their number nor on ``threads``.
+    Observations, rewards, ends and infos are those of a `gymnasium.vector.SyncVectorEnv` of single environments, in all three
+    autoreset modes. Lanes do not depend on their number nor on ``threads``.
 
     Args:
         num_envs: lanes N.
@@ -66,6 +66,7 @@ class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]
         self._max_episode_steps = max_episode_steps
         self._all = np.arange(num_envs)
         self._done = np.zeros(num_envs, dtype=bool)
+        self._started = np.zeros(num_envs, dtype=bool)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
 
     def reset(
@@ -97,6 +98,7 @@ class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]
                 self.game.simulation.streams.replace(int(lane), generator)
         self.game.reset(lanes)
         self._done[lanes] = False
+        self._started[lanes] = True
         return self.game.observation(), self._reset_info(mask)
 
     def _reset_mask(self, options: dict[str, Any] | None) -> Flags:
@@ -118,13 +120,18 @@ class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]
 
         Raises:
             ValueError: the actions have the wrong shape or are not finite.
-            RuntimeError: a lane has not been reset.
+            RuntimeError: a lane has never been reset or, where the autoreset mode is DISABLED, its game is over.
         """
+        if not self._started.all():
+            lanes = np.flatnonzero(~self._started).tolist()
+            raise RuntimeError(f"the game of lanes {lanes} has not begun: call reset() first")
         if self.autoreset_mode == AutoresetMode.NEXT_STEP:
             return self._step_then_reset(actions)
-        if self._done.any() or self._generators[0] is None:
-            lanes = np.flatnonzero(self._done).tolist() or "all"
-            raise RuntimeError(f"lanes {lanes} are over: reset them first")
+        if self._done.any():
+            lanes = np.flatnonzero(self._done).tolist()
+            raise RuntimeError(
+                f"the game of lanes {lanes} is over: reset them first, with options={{'reset_mask': ...}}"
+            )
         outcome, truncated = self._play(actions, None)
         done = outcome.terminated | truncated
         if self.autoreset_mode == AutoresetMode.DISABLED or not done.any():
@@ -144,13 +151,11 @@ class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]
         self, actions: NDArray[np.float32]
     ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
         """NEXT_STEP: the step after a lane's end begins its new game, with no reward."""
-        if self._generators[0] is None:
-            raise RuntimeError("call reset() first")
         restarted = self._done
         outcome, truncated = self._play(actions, np.flatnonzero(restarted))
         reward = np.where(restarted, 0.0, outcome.reward)
         terminated, truncated = outcome.terminated & ~restarted, truncated & ~restarted
-        info = self._step_info(outcome, ~restarted)
+        info = {} if restarted.all() else self._step_info(outcome, ~restarted)
         if restarted.any():
             _fill(info, self._reset_info(restarted), restarted)
         self._done = terminated | truncated
@@ -165,10 +170,15 @@ class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]
         for lane in np.flatnonzero(done):
             final_obs[lane] = final[lane]
         final_info = self._step_info(outcome, done)
-        info = self._step_info(outcome, ~done) if not done.all() else {}
+        info = {} if done.all() else self._step_info(outcome, ~done)
         self.game.reset(np.flatnonzero(done))
         _fill(info, self._reset_info(done), done)
-        info |= {"final_obs": final_obs, "_final_obs": done.copy(), "final_info": final_info, "_final_info": done.copy()}
+        info |= {
+            "final_obs": final_obs,
+            "_final_obs": done.copy(),
+            "final_info": final_info,
+            "_final_info": done.copy(),
+        }
         return self.game.observation(), outcome.reward, outcome.terminated, truncated, info
 
     def _reset_info(self, mask: Flags) -> dict[str, Any]:

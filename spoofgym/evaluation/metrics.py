@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spoofgym.evaluation.monte_carlo import Episodes
 from spoofgym.arrays import Floats
+from spoofgym.evaluation.monte_carlo import Episodes
 
 NORMAL_95 = 1.959963984540054
 
@@ -22,7 +22,8 @@ class AttackerScore:
         mean_undetected_error: mean of the final error where there was no alarm, and zero where there was, m.
         interval: its 95 % interval, m.
         detection_probability: share of games with an alarm.
-        median_time_to_detect: time by which half of all games had an alarm, s; None if fewer had one (censored by the end).
+        median_time_to_detect: time by which half of all games had an alarm, s; None if fewer had one (censored by the
+            end).
         error_at_detection: mean error of the estimate at the first alarm, m; None if there was none.
     """
 
@@ -47,7 +48,7 @@ def mean_interval(values: Floats) -> tuple[float, float]:
 
 
 def median_time_to_detect(episodes: Episodes) -> float | None:
-    """Kaplan-Meier median: every undetected game is censored at the end, so that it is the time by which half of all have alarmed."""
+    """Kaplan-Meier median, s: undetected games are censored at the end, so it is when half of all have alarmed."""
     n = len(episodes.alarm_epoch)
     needed = (n + 1) // 2
     times = np.sort(episodes.alarm_epoch[episodes.detected])

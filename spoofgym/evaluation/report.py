@@ -15,7 +15,8 @@ SCHEMA_VERSION = 1
 def detector_entry(detectors: Sequence[Detector], scenario: Scenario) -> dict[str, Any]:
     """``{"name", "threshold", "arl0"}``; several detectors are named together and have no common threshold.
 
-    ARL₀ is null unless the threshold was calibrated in the scenario, or the scenario's innovations are white and theory gives it.
+    ARL₀ is null unless the threshold was calibrated in the scenario, or the scenario's innovations are white and theory
+    gives it.
     """
     if len(detectors) != 1:
         return {"name": " + ".join(detector.name for detector in detectors), "threshold": None, "arl0": None}
@@ -34,7 +35,8 @@ def attacker_row(
         knowledge: of the victim that it needs.
         score: from simulation; None where nothing was played.
         exact: its exact undetected error, m, where it is known.
-        optimum: of the game, m, where it is known. The fraction is of the exact score where there is one, else of the simulated.
+        optimum: of the game, m, where it is known. The fraction is of the exact score where there is one, else of the
+            simulated.
     """
     row: dict[str, Any] = {
         "attacker": name,

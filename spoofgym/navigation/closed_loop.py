@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import enu_difference, enu_displacement
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.mechanization import mechanize
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
 
@@ -42,10 +42,10 @@ def propagate(
 ) -> None:
     """Carry runs over one epoch: mechanization, covariance, and the state kept when the fix is taken.
 
-    Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (n, samples or 0, 6) and epoch_normals (n, 9) stand at the places
-    of the runs.
+    Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (n, samples or 0, 6) and epoch_normals (n, 9) stand
+    at the places of the runs.
     """
-    rate, force, mean_force = np.empty(3), np.empty(3), np.empty(3)
+    rate, force, mean_force, residual_bias = np.empty(3), np.empty(3), np.empty(3), np.empty(6)
     middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
@@ -58,21 +58,25 @@ def propagate(
         middle = start + (stop - start) // 2
         mean_force[:] = 0.0
         interval = 0.0
+        # views taken once: slicing in the loop over samples would cost a quarter of its time
+        run_attitude, run_velocity, run_position = attitude[run], velocity[run], position[run]
+        for a in range(6):
+            residual_bias[a] = true_bias[run, a] - bias[run, a]
         for i in range(start, stop):
             if i == middle:
-                middle_attitude[:, :] = attitude[run]
-                middle_velocity[:] = velocity[run]
-                middle_position[:] = position[run]
+                middle_attitude[:, :] = run_attitude
+                middle_velocity[:] = run_velocity
+                middle_position[:] = run_position
             if i == stop - latency_samples:
-                _keep_fix(attitude[run], velocity[run], position[run], fix[run])
+                _keep_fix(run_attitude, run_velocity, run_position, fix[run])
             for a in range(3):
-                rate[a] = angular_rate[i, a] + true_bias[run, a] - bias[run, a]
-                force[a] = specific_force[i, a] + true_bias[run, 3 + a] - bias[run, 3 + a]
+                rate[a] = angular_rate[i, a] + residual_bias[a]
+                force[a] = specific_force[i, a] + residual_bias[3 + a]
             if noisy:
                 for a in range(3):
                     rate[a] += white_sample(true_noise[a], step[i], normals[place, i - start, a])
                     force[a] += white_sample(true_noise[3 + a], step[i], normals[place, i - start, 3 + a])
-            mechanize(attitude[run], velocity[run], position[run], rate, force, step[i], mean_force)
+            mechanize(run_attitude, run_velocity, run_position, rate, force, step[i], mean_force)
             interval += step[i]
         for a in range(3):
             mean_force[a] /= interval
@@ -83,10 +87,10 @@ def propagate(
             covariance[run, i, i] += half_noise[i, i]
         kalman.predict_covariance(transition, half_noise, covariance[run], product)
         if noisy:
-            _disturb_position(position[run], true_noise, np.sqrt(interval), epoch_normals[place])
+            _disturb_position(run_position, true_noise, np.sqrt(interval), epoch_normals[place])
             _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, epoch_normals[place])
         if latency_samples == 0:
-            _keep_fix(attitude[run], velocity[run], position[run], fix[run])
+            _keep_fix(run_attitude, run_velocity, run_position, fix[run])
         for a in range(3):
             fix[run, FORCE, a] = mean_force[a]
 
@@ -142,7 +146,10 @@ def innovate(
     whitened: Floats,
     nis: Floats,
 ) -> None:
-    """Innovation of runs with their own S, and the whitened gain; outputs but the gain stand at the places of the runs."""
+    """Innovation of runs with their own S, and the whitened gain.
+
+    Outputs, except the gain, stand at the places of the runs.
+    """
     m = residual.shape[1]
     observation, arm = np.zeros((m, NUM_NAVIGATION)), np.empty(3)
     cross, factor = np.empty((NUM_STATES, m)), np.empty((m, m))

@@ -1,13 +1,14 @@
 """Error dynamics of the strapdown mechanization: F, the transition matrix and the process noise.
 
-The error is estimate minus truth, in the order attitude φ (E, N, U), velocity, position in metres, gyro bias, accelerometer bias
-(R, F, U); a bias error is the true bias minus the estimated one, as it enters the compensated measurement. The computed attitude is
-(I - [φ x]) C. With x = [n; b], nine navigation and six bias states,
+The error is estimate minus truth, in the order attitude φ (E, N, U), velocity, position in metres, gyro bias,
+accelerometer bias (R, F, U); a bias error is the true bias minus the estimated one, as it enters the compensated
+measurement. The computed attitude is (I - [φ x]) C. With x = [n; b], nine navigation and six bias states,
 
-    n' = A n + B b + noise,      A (9, 9) `navigation_dynamics`,      B (9, 6): -C on φ, +C on the velocity,      b' = 0.
+    n' = A n + B b + noise,      A (9, 9) `navigation_dynamics`,      B (9, 6): -C on φ, +C on the velocity,      b' =
+    0.
 
-Sources: Liu 2018, appendix A, with its rows 3 and 9 rescaled from radians to metres; the gradient of gravity in the vertical channel,
-which Liu omits, as in Groves 2013 eq 14.63.
+Sources: Liu 2018, appendix A, with its rows 3 and 9 rescaled from radians to metres; the gradient of gravity in the
+vertical channel, which Liu omits, as in Groves 2013 eq 14.63.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from spoofgym.geodesy import earth_rate, normal_gravity, radii_of_curvature
 from spoofgym.arrays import Floats
+from spoofgym.geodesy import earth_rate, normal_gravity, radii_of_curvature
 
 NUM_NAVIGATION = 9
 NUM_STATES = 15
@@ -126,7 +127,7 @@ def transition_matrix(dynamics: Floats, attitude: Floats, interval: float, trans
 
 @njit(cache=True, nogil=True)
 def _multiply(a: Floats, b: Floats, product: Floats) -> None:
-    """product = a b for square (9, 9) matrices."""
+    """Product = a b for square (9, 9) matrices."""
     for i in range(NUM_NAVIGATION):
         for j in range(NUM_NAVIGATION):
             product[i, j] = 0.0

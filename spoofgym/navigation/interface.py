@@ -1,6 +1,7 @@
 """What one GNSS epoch is made of, and what a navigator offers.
 
-Arrays carry a leading axis of runs N; m is the dimension of the fix (3: position, 6: position and velocity), in east, north, up.
+Arrays carry a leading axis of runs N; m is the dimension of the fix (3: position, 6: position and velocity), in east,
+north, up.
 """
 
 from __future__ import annotations
@@ -8,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.streams import RunStreams
-
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,11 @@ class Timeline:
     def end(self) -> float:
         """Scenario time of the last epoch, s."""
         return self.start + self.interval * self.num_epochs
+
+    @property
+    def times(self) -> Floats:
+        """Scenario time of epochs 0..K, (K+1,), s."""
+        return np.asarray(self.start + self.interval * np.arange(self.num_epochs + 1), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -90,9 +97,9 @@ class Decision:
 class Navigator(Protocol):
     """N filters that go through the epochs of a scenario in two half-steps.
 
-    Every half-step can be asked for some of the runs only; arrays then have their length, in their order. ``index`` counts the epochs
-    of the navigator's model, -1 before the first. ``deviation`` is what lies between the fix and the scenario's reference position (and velocity) of the epoch: receiver noise plus
-    spoofing offset, (N, m).
+    Every half-step can be asked for some of the runs only; arrays then have their length, in their order. ``index``
+    counts the epochs of the navigator's model, -1 before the first. ``deviation`` is what lies between the fix and the
+    scenario's reference position (and velocity) of the epoch: receiver noise plus spoofing offset, (N, m).
     """
 
     index: Runs

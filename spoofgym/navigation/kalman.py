@@ -1,15 +1,15 @@
 """The equations of the error-state Kalman filter, one run at a time.
 
-Every function works in place on one run's arrays, so that a navigator's loop over runs allocates nothing. The measurement touches the
-nine navigation states only (H is (m, 9)), the six bias states are random constants or walks: Φ = [[Φn, Φb], [0, I]] with rows (9, 15)
-stored.
+Every function works in place on one run's arrays, so that a navigator's loop over runs allocates nothing. The
+measurement touches the nine navigation states only (H is (m, 9)), the six bias states are random constants or walks: Φ
+= [[Φn, Φb], [0, I]] with rows (9, 15) stored.
 
 The update is written in whitened form: with S = L L', U = P H' L⁻ᵀ and w = L⁻¹ z,
 
     K z = U w,        P⁺ = P - U U',        NIS = w' w,
 
-which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. Source: Bar-Shalom, Li and Kirubarajan
-2001, ch. 5, rearranged.
+which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. Source: Bar-Shalom, Li and
+Kirubarajan 2001, ch. 5, rearranged.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FULL = 15
 
 @njit(cache=True, nogil=True)
 def predict_error(transition: Floats, noise: Floats, error: Floats, work: Floats) -> None:
-    """x <- Φ x + w.
+    """X <- Φ x + w.
 
     Args:
         transition: first nine rows of Φ, (9, 15).
@@ -140,7 +140,7 @@ def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
 
 @njit(cache=True, nogil=True)
 def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
-    """w = L⁻¹ z, and the NIS w' w.
+    """W = L⁻¹ z, and the NIS w' w.
 
     Args:
         factor: L, (m, m).

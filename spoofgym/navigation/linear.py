@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.interface import Decision, Innovation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
@@ -178,7 +178,9 @@ class OwnCovarianceNavigator(LinearNavigator):
         super().propagate(runs)
         model = self.model
         self._slices.call(
-            lambda part: _propagate_covariance(part, self.index, self.covariance, model.transition, model.process_noise),
+            lambda part: _propagate_covariance(
+                part, self.index, self.covariance, model.transition, model.process_noise
+            ),
             self._all if runs is None else runs,
             GRAIN,
         )
@@ -235,7 +237,7 @@ def _propagate(
     normals: Floats,
     bias_steps: Floats,
 ) -> None:
-    """index <- index + 1, x <- Φ x + w."""
+    """Index <- index + 1, x <- Φ x + w."""
     work, noise = np.empty(NUM_NAVIGATION), np.zeros(NUM_STATES)
     for run in runs:
         index[run] += 1
@@ -253,7 +255,7 @@ def _propagate(
 
 @njit(cache=True, nogil=True)
 def _observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
-    """z = H x - deviation."""
+    """Z = H x - deviation."""
     for a in range(residual.shape[0]):
         total = -deviation[a]
         for j in range(NUM_NAVIGATION):
@@ -283,7 +285,7 @@ def _innovate(
 
 @njit(cache=True, nogil=True)
 def _correct_shared(runs: Runs, index: Runs, state: Floats, gain: Floats, whitened: Floats) -> None:
-    """x <- x - U w."""
+    """X <- x - U w."""
     for run in runs:
         k = index[run]
         for i in range(NUM_STATES):
@@ -332,7 +334,7 @@ def _innovate_own(
 
 @njit(cache=True, nogil=True)
 def _correct_own(runs: Runs, state: Floats, covariance: Floats, gain: Floats, whitened: Floats) -> None:
-    """x <- x - U w, P <- P - U U'."""
+    """X <- x - U w, P <- P - U U'."""
     for run in runs:
         for i in range(NUM_STATES):
             state[run, i] -= kalman.correction(gain[run], whitened[run], i)

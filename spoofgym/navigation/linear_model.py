@@ -1,7 +1,8 @@
-"""The error state along a true trajectory, one step per GNSS epoch: Φ, Q, H, and the gains of a filter that uses every fix.
+"""The error state along a true trajectory, one step per GNSS epoch: Φ, Q, H, gains.
 
-Liu 2018, section 4.1: a spoofing offset of kilometres changes Φ and the gain by less than 1e-3, so they can be computed once along the
-truth and serve every run. The transition is the product over the IMU samples of the epoch, not a series in the epoch's length.
+Liu 2018, section 4.1: a spoofing offset of kilometres changes Φ and the gain by less than 1e-3, so they can be computed
+once along the truth and serve every run. The transition is the product over the IMU samples of the epoch, not a series
+in the epoch's length.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from spoofgym.arrays import Floats
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
-from spoofgym.arrays import Floats
 from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
@@ -125,10 +126,11 @@ def error_dynamics(
 def observation_matrices(trajectory: Trajectory, receiver: Receiver, samples: np.ndarray) -> Floats:
     """H on the nine navigation states at IMU samples, (E, m, 9).
 
-    The antenna sits at the lever arm l and the fix is τ old: z = δp + (C l) x φ - τ δv, and with velocity z_v = δv - τ f x φ.
+    The antenna sits at the lever arm l and the fix is τ old: z = δp + (C l) x φ - τ δv, and with velocity z_v = δv - τ
+        f x φ.
     """
     attitude = trajectory.attitude[samples]
-    arm = np.array([[sum(c[i, j] * receiver.lever_arm[j] for j in range(3)) for i in range(3)] for c in attitude])
+    arm = antenna_arm(attitude, receiver)
     observation = np.zeros((len(samples), receiver.dimension, NUM_NAVIGATION))
     observation[:, :3, 0:3] = _cross(arm)
     observation[:, range(3), range(3, 6)] = -receiver.latency
@@ -140,6 +142,11 @@ def observation_matrices(trajectory: Trajectory, receiver: Receiver, samples: np
     return observation
 
 
+def antenna_arm(attitude: Floats, receiver: Receiver) -> Floats:
+    """C l, the lever arm in ENU for attitudes (E, 3, 3), (E, 3), m."""
+    return np.einsum("eij,j->ei", attitude, np.array(receiver.lever_arm, dtype=np.float64))
+
+
 def _cross(vectors: Floats) -> Floats:
     """Cross-product matrices [v x], (E, 3, 3)."""
     x, y, z = vectors.T
@@ -147,7 +154,9 @@ def _cross(vectors: Floats) -> Floats:
     return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
 
 
-def linear_model(dynamics: ErrorDynamics, prior_covariance: Floats, tuning: FilterTuning, timeline: Timeline) -> LinearModel:
+def linear_model(
+    dynamics: ErrorDynamics, prior_covariance: Floats, tuning: FilterTuning, timeline: Timeline
+) -> LinearModel:
     """The game on epochs 0..K of ``dynamics``, every fix used.
 
     Args:
@@ -158,7 +167,7 @@ def linear_model(dynamics: ErrorDynamics, prior_covariance: Floats, tuning: Filt
     """
     covariance, factor, gain, innovation = filter_gains(dynamics, prior_covariance, tuning.measurement_covariance)
     return LinearModel(
-        time=timeline.start + timeline.interval * np.arange(timeline.num_epochs + 1),
+        time=timeline.times,
         transition=dynamics.transition,
         process_noise=dynamics.process_noise,
         noise_factor=np.array([semidefinite_factor(q) for q in dynamics.true_noise]),
@@ -226,7 +235,7 @@ def _accumulate(
     transition: Floats,
     noise: Floats,
 ) -> None:
-    """Multiply the transitions of the IMU samples of every epoch, and carry the noise of each sample to the epoch's end."""
+    """Multiply the transitions of the IMU samples of every epoch, and carry their noise to its end."""
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
     one = np.empty((NUM_NAVIGATION, NUM_STATES))
     product = np.empty((NUM_NAVIGATION, NUM_STATES))

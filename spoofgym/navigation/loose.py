@@ -1,18 +1,18 @@
 """The strapdown fidelity: N loosely coupled INS/GNSS filters at the IMU rate, closed loop.
 
-Between two fixes each run mechanizes its own noisy samples; at the epoch the error dynamics are formed once, from the mean specific force
-and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order; process noise half before, half
-after Φ). The estimated error is fed back into the mechanization after every used fix.
+Between two fixes each run mechanizes its own noisy samples; at the epoch the error dynamics are formed once, from the
+mean specific force and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order;
+process noise half before, half after Φ). The estimated error is fed back into the mechanization after every used fix.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.navigation import closed_loop
 from spoofgym.navigation.error_model import NUM_STATES
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.interface import Decision, Innovation
 from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY

@@ -1,4 +1,4 @@
-"""A game in the strapdown fidelity: the inertial samples, the fixes' reference positions, and what starts each episode."""
+"""A game in the strapdown fidelity: inertial samples, reference positions of the fixes, and the start."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.geodesy import displace
 from spoofgym.arrays import Floats
+from spoofgym.geodesy import displace
 from spoofgym.navigation.interface import Timeline
+from spoofgym.navigation.linear_model import antenna_arm
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.receiver import Receiver
@@ -20,7 +21,8 @@ from spoofgym.trajectory import Trajectory
 class StrapdownModel:
     """What N strapdown navigators have in common: epochs k = 0..K, of which 0 is the last clean one.
 
-    The samples come from a true trajectory, with sensor errors added per run, or from a recorded log, whose samples have their own.
+    The samples come from a true trajectory, with sensor errors added per run, or from a recorded log, whose samples
+    have their own.
 
     Attributes:
         time: of the epochs, (K+1,), s.
@@ -28,14 +30,16 @@ class StrapdownModel:
         specific_force: the same, m/s².
         step: duration of each sample, (n,), s.
         boundaries: samples boundaries[k]..boundaries[k+1] lead to epoch k, (K+2,).
-        fix_position: of the antenna when the fix was taken, without receiver noise, (K+1, 3), latitude rad, longitude rad, height m.
+        fix_position: of the antenna when the fix was taken, without receiver noise, (K+1, 3), latitude rad, longitude
+            rad, height m.
         fix_velocity: the same, ENU, (K+1, 3), m/s.
         true_position: against which the error is formed, (K+1, 3).
         lever_arm: of the antenna, body R, F, U, (3,), m.
         latency_samples: inertial samples between the fix and its epoch.
         measurement_covariance: the filter's R, (K+1, m, m).
         filter_density: the filter's process noise, (15,), unit²/s.
-        true_noise: standard deviation density of the noise that acts on angular rate, specific force and position of each run, (9,).
+        true_noise: standard deviation density of the noise that acts on angular rate, specific force and position of
+            each run, (9,).
         instability_sigma: of the biases, (6,); `instability_decay`: over an epoch.
         attitude: before epoch 0, body to ENU, (3, 3).
         velocity: before epoch 0, (3,) ENU, m/s.
@@ -105,9 +109,9 @@ def strapdown_model(
     ends = first + boundaries[1:]
     used = slice(first, int(ends[-1]))
     taken = ends - round(receiver.latency * trajectory.rate)
-    arm = np.array([[sum(c[i, j] * receiver.lever_arm[j] for j in range(3)) for i in range(3)] for c in trajectory.attitude[taken]])
+    arm = antenna_arm(trajectory.attitude[taken], receiver)
     return StrapdownModel(
-        time=timeline.start + timeline.interval * np.arange(timeline.num_epochs + 1),
+        time=timeline.times,
         angular_rate=trajectory.angular_rate[used],
         specific_force=trajectory.specific_force[used],
         step=np.full(used.stop - first, 1.0 / trajectory.rate),

@@ -20,8 +20,8 @@ class FilterTuning:
         attitude_sigma: initial attitude error (E, N, U), 1 sigma, rad.
         velocity_sigma: initial velocity error (E, N, U), m/s.
         position_sigma: initial position error (E, N, U), m.
-        initial_scale: the filter starts with (initial_scale x sigma)², while the true initial error has 1 sigma (Liu 2018, appendix D:
-            3); the bias sigmas are the data sheet's.
+        initial_scale: the filter starts with (initial_scale x sigma)², while the true initial error has 1 sigma (Liu
+            2018, appendix D: 3); the bias sigmas are the data sheet's.
         position_random_walk: process noise of the position, m/√s: the errors of the navigation computation.
         process_noise_scale: factor on the variance of the inertial process noise.
         measurement_sigma: the filter's R, 1 sigma per axis of the fix, (3,) m or (6,) m and m/s.

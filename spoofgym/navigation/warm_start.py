@@ -1,7 +1,7 @@
 """The joint distribution of truth and filter at the moment a game begins.
 
-An episode starts with a warm filter. Its covariance follows from its own recursion along the trajectory; its true error follows from
-the recursion of the joint covariance of everything that is random in the truth,
+An episode starts with a warm filter. Its covariance follows from its own recursion along the trajectory; its true error
+follows from the recursion of the joint covariance of everything that is random in the truth,
 
     y = [x (15), bias instability (6), coloured receiver noise (3), constant bias (6)],
 
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.arrays import Floats
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import ErrorDynamics, filter_gains, semidefinite_factor
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.sensors.imu import ImuGrade
@@ -62,7 +62,8 @@ def warm_up(
 ) -> WarmStart:
     """Carry a start over the epochs of ``dynamics``, every fix used.
 
-    The joint covariance is propagated as y <- A y + noise and updated as y <- (I - G [H, 0, -I, 0]) y + G n, G the filter's gain on x.
+    The joint covariance is propagated as y <- A y + noise and updated as y <- (I - G [H, 0, -I, 0]) y + G n, G the
+    filter's gain on x.
     """
     measurement_covariance = tuning.measurement_covariance
     prior, factor, gain, _ = filter_gains(dynamics, start.filter_covariance, measurement_covariance)

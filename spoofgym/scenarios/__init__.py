@@ -7,9 +7,10 @@ from functools import lru_cache
 
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.liu_flight import liu_flight
+from spoofgym.scenarios.recorded import recorded
 from spoofgym.specification import build
 
-SCENARIOS: dict[str, Callable[..., Scenario]] = {"liu-flight": liu_flight}
+SCENARIOS: dict[str, Callable[..., Scenario]] = {"liu-flight": liu_flight, "recorded": recorded}
 
 
 @lru_cache(maxsize=32)

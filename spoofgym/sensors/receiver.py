@@ -55,6 +55,8 @@ class Receiver:
             raise ValueError(
                 f"receiver: latency must be less than the interval of {self.interval:g} s, got {self.latency!r}"
             )
+        if len(self.lever_arm) != 3:
+            raise ValueError(f"receiver: lever_arm must be three numbers (R, F, U), got {self.lever_arm!r}")
         for value in self.lever_arm:
             validation.finite("receiver", "lever_arm", value)
 

@@ -1,0 +1,274 @@
+"""Reading a recorded log: inertial samples, GNSS fixes and, where there is one, a reference solution.
+
+A log is a folder in the project's format (docs/log-format.md): north-east-down, degrees, raw sensor axes. It is converted here, at the
+door; everything behind works in east-north-up, right-forward-up and radians.
+"""
+
+from __future__ import annotations
+
+import gzip
+import math
+import sys
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spoofgym.arrays import Floats
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+IMU_COLUMNS = ("t_s", "gx_radps", "gy_radps", "gz_radps", "ax_mps2", "ay_mps2", "az_mps2")
+POSITION_COLUMNS = ("t_s", "lat_deg", "lon_deg", "h_m")
+VELOCITY_COLUMNS = ("vn_mps", "ve_mps", "vd_mps")
+POSITION_SIGMA_COLUMNS = ("sd_n_m", "sd_e_m", "sd_d_m")
+VELOCITY_SIGMA_COLUMNS = ("sd_vn_mps", "sd_ve_mps", "sd_vd_mps")
+
+LIMITS = {"lat_deg": (-89.0, 89.0), "lon_deg": (-360.0, 360.0), "h_m": (-12_000.0, 100_000.0)} | {
+    name: (0.0, math.inf) for name in POSITION_SIGMA_COLUMNS + VELOCITY_SIGMA_COLUMNS
+}
+"""Valid values, inclusive, of columns that have bounds."""
+PLAUSIBLE_FORCE = (5.0, 20.0)
+"""Median magnitude of a specific force that contains gravity and is in m/s²."""
+ROTATION_TOLERANCE = 1e-3
+
+_ENU_OF_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""East, north, up from north, east, down; and right, forward, up from forward, right, down."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fixes:
+    """Positions in time: a receiver's fixes, or a reference solution.
+
+    Attributes:
+        time: (n,), s, increasing.
+        position: latitude rad, longitude rad, ellipsoidal height m, (n, 3).
+        velocity: ENU, (n, 3), m/s; None = not in the log.
+        position_sigma: ENU, (n, 3), m; None = not in the log.
+        velocity_sigma: ENU, (n, 3), m/s; None = not in the log.
+    """
+
+    time: Floats
+    position: Floats
+    velocity: Floats | None
+    position_sigma: Floats | None
+    velocity_sigma: Floats | None
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A recorded drive or flight; all times on one clock.
+
+    Attributes:
+        name: of the log.
+        folder: it was read from.
+        start: first moment fit for alignment, s.
+        imu_time: of the inertial samples, (n,), s, increasing, the IMU's delay subtracted.
+        angular_rate: body R, F, U, (n, 3), rad/s.
+        specific_force: the same, m/s².
+        fixes: of the receiver, their delay subtracted.
+        reference: solution to compare with; None = the log has none.
+    """
+
+    name: str
+    folder: Path
+    start: float
+    imu_time: Floats
+    angular_rate: Floats
+    specific_force: Floats
+    fixes: Fixes
+    reference: Fixes | None
+
+
+def read_log(folder: str | Path) -> Log:
+    """Read and check a log.
+
+    Args:
+        folder: holds ``log.toml``, ``imu.csv``, ``gnss.csv`` and perhaps ``reference.csv``; each table may be gzipped (``.csv.gz``).
+
+    Raises:
+        ValueError: a file or column is missing, a value is not a finite number or out of range, time does not increase (each with file
+            name, and line where there is one), the mounting is unknown, or IMU, fixes and ``start_s`` do not overlap.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ValueError(f"log {str(folder)!r} is no folder; a log is a folder with log.toml, imu.csv and gnss.csv")
+    notes = _read_notes(folder / "log.toml")
+    name = notes.get("name", folder.name)
+    mounting = _ENU_OF_NED @ _mounting(folder / "log.toml", notes)
+    start = _number(folder / "log.toml", notes, "start_s", None)
+
+    path = _table_path(folder, "imu")
+    imu = _read_table(path, [IMU_COLUMNS], [])
+    force = np.column_stack([imu[column] for column in IMU_COLUMNS[4:]])
+    magnitude = float(np.median(np.linalg.norm(force, axis=1)))
+    if not PLAUSIBLE_FORCE[0] <= magnitude <= PLAUSIBLE_FORCE[1]:
+        raise ValueError(
+            f"{path}: the median specific force is {magnitude:.3g}; it must be in m/s² and contain gravity (about 9.8)"
+        )
+    log = Log(
+        name=str(name),
+        folder=folder,
+        start=start,
+        imu_time=imu["t_s"] - _number(folder / "log.toml", notes, "imu_delay_s", 0.0),
+        angular_rate=np.column_stack([imu[column] for column in IMU_COLUMNS[1:4]]) @ mounting.T,
+        specific_force=force @ mounting.T,
+        fixes=_read_fixes(_table_path(folder, "gnss"), _number(folder / "log.toml", notes, "gnss_delay_s", 0.0)),
+        reference=_read_fixes(_table_path(folder, "reference"), 0.0) if _has_table(folder, "reference") else None,
+    )
+    _check_overlap(log)
+    return log
+
+
+def _check_overlap(log: Log) -> None:
+    first = max(log.start, log.imu_time[0], log.fixes.time[0])
+    last = min(log.imu_time[-1], log.fixes.time[-1])
+    if first >= last:
+        raise ValueError(
+            f"log {str(log.folder)!r}: no overlap: IMU from {log.imu_time[0]:g} to {log.imu_time[-1]:g} s, fixes from "
+            f"{log.fixes.time[0]:g} to {log.fixes.time[-1]:g} s, start_s {log.start:g} s"
+        )
+    if log.reference is not None and log.reference.time[0] > last:
+        raise ValueError(f"log {str(log.folder)!r}: the reference begins at {log.reference.time[0]:g} s, after the log's end")
+
+
+def _read_notes(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise ValueError(f"{path} is missing")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not valid TOML: {error}") from None
+
+
+def _number(path: Path, notes: dict[str, Any], key: str, default: float | None) -> float:
+    value = notes.get(key, default)
+    if value is None:
+        raise ValueError(f"{path}: {key} is missing; it must be a finite number of seconds")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ValueError(f"{path}: {key} must be a finite number of seconds, got {value!r}")
+    return float(value)
+
+
+def _mounting(path: Path, notes: dict[str, Any]) -> Floats:
+    """Rotation from sensor axes to body forward-right-down, (3, 3)."""
+    value = notes.get("imu_to_body_frd", [])
+    if value == []:
+        raise ValueError(f"{path}: imu_to_body_frd is empty: a log with unknown mounting is not supported yet")
+    message = f"{path}: imu_to_body_frd must be a rotation, 3 rows of 3 numbers (body forward, right, down), got {value!r}"
+    try:
+        matrix = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(message) from None
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
+        raise ValueError(message)
+    left, scale, right = np.linalg.svd(matrix)
+    rotation: Floats = left @ right
+    if np.any(np.abs(scale - 1.0) > ROTATION_TOLERANCE) or np.linalg.det(rotation) < 0.0:
+        raise ValueError(message)
+    return rotation
+
+
+def _has_table(folder: Path, name: str) -> bool:
+    return (folder / f"{name}.csv").is_file() or (folder / f"{name}.csv.gz").is_file()
+
+
+def _table_path(folder: Path, name: str) -> Path:
+    present = [path for path in (folder / f"{name}.csv", folder / f"{name}.csv.gz") if path.is_file()]
+    if not present:
+        raise ValueError(f"{folder / name}.csv (or .csv.gz) is missing")
+    if len(present) == 2:
+        raise ValueError(f"{folder}: {present[0].name} and {present[1].name} are both there; keep one")
+    return present[0]
+
+
+def _read_fixes(path: Path, delay: float) -> Fixes:
+    table = _read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS, VELOCITY_SIGMA_COLUMNS])
+    position = np.column_stack([np.radians(table["lat_deg"]), np.radians(table["lon_deg"]), table["h_m"]])
+
+    def enu(columns: tuple[str, ...], matrix: Floats) -> Floats | None:
+        if columns[0] not in table:
+            return None
+        return np.column_stack([table[column] for column in columns]) @ matrix.T
+
+    return Fixes(
+        time=table["t_s"] - delay,
+        position=position,
+        velocity=enu(VELOCITY_COLUMNS, _ENU_OF_NED),
+        position_sigma=enu(POSITION_SIGMA_COLUMNS, np.abs(_ENU_OF_NED)),
+        velocity_sigma=enu(VELOCITY_SIGMA_COLUMNS, np.abs(_ENU_OF_NED)),
+    )
+
+
+def _read_table(
+    path: Path, required: list[tuple[str, ...]], optional: list[tuple[str, ...]]
+) -> dict[str, Floats]:
+    """Columns of a CSV file by their names; each optional group is there as a whole or not at all."""
+    lines = _lines(path)
+    header = [name.strip() for name in lines[0].split(",")] if lines else []
+    wanted: list[str] = []
+    for group in required + optional:
+        missing = [name for name in group if name not in header]
+        if missing and (group in required or len(missing) < len(group)):
+            raise ValueError(
+                f"{path}, line 1: column {missing[0]!r} is missing; needed together: {', '.join(group)}; "
+                f"found: {', '.join(header) or 'nothing'}"
+            )
+        if not missing:
+            wanted += group
+    twice = [name for name in wanted if header.count(name) > 1]
+    if twice:
+        raise ValueError(f"{path}, line 1: column {twice[0]!r} is there twice")
+    if len(lines) < 3:
+        raise ValueError(f"{path}: needs two lines of data or more below the header")
+    places = [header.index(name) for name in wanted]
+    try:
+        values = np.loadtxt(lines[1:], delimiter=",", usecols=places, comments=None, ndmin=2)
+    except ValueError:
+        values = None
+    if values is None or len(values) != len(lines) - 1 or not np.all(np.isfinite(values)):
+        raise _bad_value(path, lines, wanted, places)
+    for column, name in enumerate(wanted):
+        low, high = LIMITS.get(name, (-math.inf, math.inf))
+        wrong = np.flatnonzero((values[:, column] < low) | (values[:, column] > high))
+        if len(wrong):
+            bounds = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
+            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {values[wrong[0], column]:g}")
+    late = np.flatnonzero(np.diff(values[:, 0]) <= 0.0)
+    if len(late):
+        before, after = values[late[0], 0], values[late[0] + 1, 0]
+        raise ValueError(f"{path}, line {late[0] + 3}: t_s must increase, got {after:.9g} after {before:.9g}")
+    return {name: np.ascontiguousarray(values[:, column]) for column, name in enumerate(wanted)}
+
+
+def _lines(path: Path) -> list[str]:
+    """Lines of a plain or gzipped text file, without blank ones at its end."""
+    data = path.read_bytes()
+    try:
+        if path.suffix == ".gz":
+            data = gzip.decompress(data)
+        text = data.decode("utf-8-sig")
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read: {error}") from None
+    return text.rstrip().splitlines()
+
+
+def _bad_value(path: Path, lines: list[str], wanted: list[str], places: list[int]) -> ValueError:
+    """The error that names the first line with a value that is not a finite number."""
+    for number, line in enumerate(lines[1:], start=2):
+        cells = line.split(",")
+        for name, place in zip(wanted, places, strict=True):
+            if place >= len(cells):
+                return ValueError(f"{path}, line {number}: {name} is missing, the line has {len(cells)} of the columns")
+            try:
+                valid = math.isfinite(float(cells[place])) and "_" not in cells[place]
+            except ValueError:
+                valid = False
+            if not valid:
+                return ValueError(f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()!r}")
+    return ValueError(f"{path}: cannot be read as a table of numbers")
