@@ -63,7 +63,7 @@ class Scenario(ABC):
 
     @abstractmethod
     def linear_model(self, burn_in: int = 0) -> LinearModel:
-        """The game in the linear fidelity, from epoch -burn_in on, every fix used: what a spoofer's shadow filter knows.
+        """The game in the linear fidelity from epoch -burn_in on, every fix used: what a shadow filter knows.
 
         Raises:
             ValueError: the scenario has no such model.
@@ -166,8 +166,8 @@ class SimulatedScenario(Scenario):
     def matched(self) -> bool:  # type: ignore[override]
         """Whether the noises that act are white and are those the filter believes in.
 
-        The initial covariance may still be over-stated; what is left of that after the warm-up shows only in states that the fixes hardly
-        observe.
+        The initial covariance may still be over-stated; what is left of that after the warm-up shows only in states
+        that the fixes hardly observe.
         """
         return (
             not any(self.receiver.markov_sigma)

@@ -57,7 +57,8 @@ class Simulation:
             threads: for slices of runs.
 
         Raises:
-            ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the game.
+            ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the
+                game.
         """
         if num_runs < 1:
             raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
@@ -111,7 +112,7 @@ class Simulation:
             self.alarm[runs] = self._test(epoch, bank)
             self._merge(runs, epoch)
             self._remember(runs, bank)
-            self._decide()
+            self._decide_first(runs, epoch)
         return self.epoch
 
     def restart(self, runs: Runs) -> None:
@@ -124,7 +125,11 @@ class Simulation:
             detector.take(runs, bank[name])
 
     def _warm(self, runs: Runs) -> dict[str, Detector]:
-        """New episodes just before epoch 0, and detectors of these runs alone that have seen a clean burn-in without an alarm."""
+        """New episodes just before epoch 0.
+
+        Returns:
+            Detectors of these runs alone, which have seen a clean burn-in without an alarm.
+        """
         bank = {name: copy.copy(detector) for name, detector in self.detectors.items()}
         for detector in bank.values():
             detector.bind(len(runs), self.scenario.dimension)
@@ -216,7 +221,8 @@ class Simulation:
         """Second half of the present epoch of runs (all by default): use the fix or leave it out.
 
         Args:
-            decision: of a defender outside, for these runs; None = the response's, or to use every fix where there is none.
+            decision: of a defender outside, for these runs; None = the response's, or to use every fix where there is
+                none.
             runs: which.
         """
         if decision is None:
@@ -257,3 +263,12 @@ class Simulation:
         """The response sees each epoch once."""
         if self.response is not None:
             self._decision = self.response.decide(self.epoch, self.alarm)
+
+    def _decide_first(self, runs: Runs, epoch: Epoch) -> None:
+        """A copy of the response that serves these runs alone sees their epoch 0, so that the others see theirs once."""
+        if self.response is not None:
+            part = copy.copy(self.response)
+            part.bind(len(runs))
+            part.reset(np.arange(len(runs)))
+            self._decision.use[runs] = part.decide(epoch, self.alarm[runs]).use
+            self.response.take(runs, part)

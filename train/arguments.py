@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+
+PICTURES = (".png", ".svg", ".pdf")
 
 
 def count(text: str) -> int:
@@ -25,3 +28,11 @@ def seed_number(text: str) -> int:
     if value < 0:
         raise argparse.ArgumentTypeError(f"a seed is 0 or more, got {text!r}")
     return value
+
+
+def picture(text: str) -> Path:
+    """A file whose ending names a picture format."""
+    path = Path(text)
+    if path.suffix.lower() not in PICTURES:
+        raise argparse.ArgumentTypeError(f"a figure's name ends in {', '.join(PICTURES)}, got {text!r}")
+    return path

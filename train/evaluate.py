@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from spoofgym.evaluation.recorded import evaluate_recorded
 
 from agents.baselines import exact_threshold
 from agents.learned import LearnedSpoofer
@@ -25,11 +24,12 @@ from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
 from spoofgym.scenario import FIDELITIES, Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded import RecordedScenario
-from train.arguments import count, seed_number
+from train.arguments import count, picture, seed_number
 from train.attackers import Evaluation
 from train.presentation import attackers_figure, attackers_table, recorded_table
 
@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
     add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
     add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
     add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
-    add("--figure", type=Path, help="write a figure (PNG, SVG or PDF by its ending)")
+    add("--figure", type=picture, metavar="FILE", help="write a figure: PNG, SVG or PDF by its ending")
     return result
 
 

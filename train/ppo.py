@@ -23,6 +23,8 @@ from spoofgym.envs.vector import SpooferVectorEnv
 from train.expected_alarm import ExpectedAlarmVectorEnv, alarm_probability_is_known
 
 CHECKPOINT_FILE = "checkpoint.pt"
+LAST_RATE = 0.02
+"""Share of the learning rate at which its fall ends: the last rollout overshoots the number of steps."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,10 +35,11 @@ class Settings:
         lanes: games played at once.
         minibatches: of a rollout, which is one whole game of every lane.
         epochs: passes over a rollout.
-        learning_rate: at the start; falls linearly to zero at the last step.
+        learning_rate: at the start; falls linearly to almost zero at the last step.
         log_std: of the policy at the start.
         gae_lambda: of the advantage estimate; the discount is 1, since the game is finite.
         clip_range: of the policy ratio.
+        max_grad_norm: at which the gradient of a minibatch is clipped.
         hidden: width of the two hidden layers of policy and value.
     """
 
@@ -45,8 +48,9 @@ class Settings:
     epochs: int = 10
     learning_rate: float = 2e-3
     log_std: float = -1.5
-    gae_lambda: float = 0.95
+    gae_lambda: float = 0.99
     clip_range: float = 0.2
+    max_grad_norm: float = 10.0
     hidden: int = 64
 
 
@@ -69,10 +73,11 @@ def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: P
         n_steps=horizon,
         batch_size=max(1, settings.lanes * horizon // settings.minibatches),
         n_epochs=settings.epochs,
-        learning_rate=lambda remaining: settings.learning_rate * max(remaining, 0.0),  # the last rollout may overshoot
+        learning_rate=lambda remaining: settings.learning_rate * max(remaining, LAST_RATE),
         gamma=1.0,
         gae_lambda=settings.gae_lambda,
         clip_range=settings.clip_range,
+        max_grad_norm=settings.max_grad_norm,
         policy_kwargs={"net_arch": [settings.hidden, settings.hidden], "log_std_init": settings.log_std},
         tensorboard_log=str(folder / "tensorboard"),
         seed=seed,

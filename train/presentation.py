@@ -7,7 +7,6 @@ from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 BASELINE, LEARNED, BOUND = "#9a9a9a", "#0072b2", "#d55e00"
@@ -27,7 +26,7 @@ def attackers_table(report: dict[str, Any]) -> Table:
         title=f"{report['scenario']}, {report['fidelity']}, {detector['name']}{threshold}{arl0}",
         caption="error: mean undetected horizontal error with 95 % interval; median: time by which half of the games "
         "had an alarm; at alarm: mean error then; exact: without simulation",
-        box=SIMPLE_HEAD,
+        box=None, padding=(0, 2, 0, 0),
     )
     table.add_column("attacker", no_wrap=True)
     table.add_column("knows", no_wrap=True)
@@ -37,7 +36,7 @@ def attackers_table(report: dict[str, Any]) -> Table:
         error = "–"
         if row["ci95_m"] is not None:
             half = 0.5 * (row["ci95_m"][1] - row["ci95_m"][0])
-            error = f"{row['mean_undetected_error_m']:.2f} ± {half:.2f}"
+            error = f"{row['mean_undetected_error_m']:.2f} ±{half:.2f}"
         table.add_row(
             row["attacker"],
             row["knowledge"],
@@ -54,7 +53,7 @@ def attackers_table(report: dict[str, Any]) -> Table:
 
 def recorded_table(report: dict[str, Any]) -> Table:
     """A ``"recorded"`` report for the terminal."""
-    table = Table(title=f"{report['scenario']}, {report['detector']['name']}", box=SIMPLE_HEAD)
+    table = Table(title=f"{report['scenario']}, {report['detector']['name']}", box=None, padding=(0, 2, 0, 0))
     table.add_column("attack", no_wrap=True)
     for title in (
         "clean\nmedian m",
@@ -85,13 +84,7 @@ def recorded_table(report: dict[str, Any]) -> Table:
 
 
 def attackers_figure(report: dict[str, Any], path: Path) -> None:
-    """Bars of the undetected error of each attacker, with intervals, beside the optimum and the upper bound.
-
-    Raises:
-        ValueError: the file's ending names no picture format.
-    """
-    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise ValueError(f"--figure must end in .png, .svg or .pdf, got {path.name!r}")
+    """Bars of the undetected error of each attacker, with intervals, beside the optimum and the upper bound."""
     played = [row for row in report["rows"] if row["mean_undetected_error_m"] is not None]
     bounds = {row["attacker"]: row["exact_undetected_error_m"] for row in report["rows"]}
     figure = Figure(figsize=(8.0, 0.55 * len(played) + 1.9), dpi=120, layout="constrained")

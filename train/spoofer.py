@@ -1,6 +1,6 @@
 """Train a PPO spoofer.
 
-    python -m train.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --steps 4000000 --seed 0 --out
+    python -m train.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --steps 2000000 --seed 0 --out
     runs/x
 
 Writes into the run folder: the policy (``policy.npz``, arrays only), what it was trained on (``config.json``),
@@ -28,7 +28,7 @@ from spoofgym.scenario import FIDELITIES
 from train.arguments import count, seed_number
 from train.ppo import CHECKPOINT_FILE, Settings, export, load_checkpoint, make_learner, save_checkpoint, write_config
 
-DEFAULT_STEPS = 4_000_000
+DEFAULT_STEPS = 2_000_000
 
 
 def parser() -> argparse.ArgumentParser:

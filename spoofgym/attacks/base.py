@@ -18,7 +18,8 @@ class Attack(ABC):
     A subclass computes its `offset`; a random one draws an episode's numbers in `reset`.
 
     Attributes:
-        onset: scenario time from which the offset grows, s; None = the start of the game (its epoch 0, the last clean one).
+        onset: scenario time from which the offset grows, s; None = the start of the game (its epoch 0, the last clean
+            one).
     """
 
     onset: float | None = None
@@ -44,7 +45,7 @@ class Attack(ABC):
         self._timeline = timeline
         self._num_runs = num_runs
 
-    def reset(self, runs: Runs, streams: RunStreams) -> None:
+    def reset(self, runs: Runs, streams: RunStreams) -> None:  # noqa: B027 - a profile without noise draws nothing
         """Start new episodes; a random attack draws here, a block per run from the stream "opponent"."""
 
     def elapsed(self, clock: Clock) -> Floats:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from spoofgym import validation
-from spoofgym.attacks.base import Attack
 from spoofgym.arrays import Floats, Runs
+from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
@@ -68,7 +68,7 @@ class Ramp(Attack):
 
 
 class JumpRamp(Attack):
-    """Unsynchronised ramp: a jump b at the onset, then a ramp, s(t) = alpha t + b (Liu 2018, eq 14), both along one direction.
+    """Unsynchronised ramp: a jump b, then a ramp along the same direction, s(t) = alpha t + b (Liu 2018, eq 14).
 
     Args:
         rate: alpha, m/s.
@@ -102,8 +102,8 @@ class JumpRamp(Attack):
 class RandomProfile(Attack):
     """An attack that draws the offsets of an episode in its reset.
 
-    A run draws a block of fixed size from its own stream "opponent", whatever the onset, so that run i is the same for any number of
-    runs and the next episode starts at the same place of the stream.
+    A run draws a block of fixed size from its own stream "opponent", whatever the onset, so that run i is the same for
+    any number of runs and the next episode starts at the same place of the stream.
 
     Args:
         mean: of the normal disturbance, on each axis, m.
@@ -112,7 +112,8 @@ class RandomProfile(Attack):
         axes: letters of the axes that are spoofed: ``e``, ``n``, ``u``.
 
     Raises:
-        ValueError: a negative variance, a value that is not finite, or axes other than these letters, each at most once.
+        ValueError: a negative variance, a value that is not finite, or axes other than these letters, each at most
+            once.
     """
 
     kind: str
@@ -146,7 +147,7 @@ class RandomProfile(Attack):
         """
         super().bind(timeline, num_runs)
         index = np.arange(timeline.num_epochs + 1)
-        clock = Clock(index, timeline.start + timeline.interval * index)
+        clock = Clock(index, np.asarray(timeline.start + timeline.interval * index, dtype=np.float64))
         self._runs = np.arange(num_runs)
         self._columns = [AXES.index(letter) for letter in self.axes]
         self._elapsed = self.elapsed(clock)
@@ -211,7 +212,8 @@ class Jump(RandomProfile):
 class SlowChange(RandomProfile):
     """A random walk with drift: a normal disturbance is added in every second, on every axis (Song 2021, eq 29).
 
-    Within a second it grows evenly ("slowly and continuously during each second"), which only a receiver faster than 1 Hz shows.
+    Within a second it grows evenly ("slowly and continuously during each second"), which only a receiver faster than 1
+    Hz shows.
 
     Args and errors as `RandomProfile`; the mean is that of one second.
     """

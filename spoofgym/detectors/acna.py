@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym import validation
+from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.ring import Ring
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.interface import Epoch
 from spoofgym.specification import spell
 
@@ -30,29 +30,32 @@ def horizontal_drift(residual: Floats) -> Floats:
 
 
 class Acna(Detector):
-    """Credible navigation by drift: alarm after consecutive large drifts, or when their mean is large (Song 2021, eqs 11, 26, 27).
+    """Alarm after consecutive large drifts, or when their mean is large (Song 2021, eqs 11, 26, 27).
 
-    The auxiliary position is the INS propagated without GNSS from the last accepted fix. In a closed-loop loosely coupled filter that
-    is the INS itself, so the drift is the horizontal norm of the innovation.
+    The auxiliary position is the INS propagated without GNSS from the last accepted fix. In a closed-loop loosely
+    coupled filter that is the INS itself, so the drift is the horizontal norm of the innovation.
 
-    Jump (eq 26): flag_j counts consecutive drifts above Th_j and alarms at n_j, i.e. when the least of the last n_j drifts exceeds
-    Th_j. Slow change (eq 27): the mean of the last n_s drifts reaches Th_s. The statistic is the larger of both over its threshold, so
-    Song's rule is ``threshold`` = 1; calibration scales both tests by one factor, which is then the threshold. Drifts that have not
-    come yet count as zero. The interruption of GNSS, an alarm of its own in the paper (step 3), is none here: there is no fix to test.
+    Jump (eq 26): flag_j counts consecutive drifts above Th_j and alarms at n_j, i.e. when the least of the last n_j
+    drifts exceeds Th_j. Slow change (eq 27): the mean of the last n_s drifts reaches Th_s. The statistic is the larger
+    of both over its threshold, so Song's rule is ``threshold`` = 1; calibration scales both tests by one factor, which
+    is then the threshold. Drifts that have not come yet count as zero. The interruption of GNSS, an alarm of its own in
+    the paper (step 3), is none here: there is no fix to test.
 
-    With nothing given the thresholds keep Song's ratio 1.5 : 1.28 and are scaled to an ARL0 of 1e5. A drift is in metres and its spread
-    depends on the filter, so ``threshold`` is None until calibration sets it in the scenario.
+    With nothing given the thresholds keep Song's ratio 1.5 : 1.28 and are scaled to an ARL0 of 1e5. A drift is in
+    metres and its spread depends on the filter, so ``threshold`` is None until calibration sets it in the scenario.
 
     Args:
         jump_epochs: n_j, consecutive epochs of the jump test; more than 1 (eq 15).
         jump_threshold: Th_j, m; together with ``slow_threshold``.
         slow_epochs: n_s, epochs of the mean; more than n_j (eq 16).
-        slow_threshold: Th_s, m. Eqs 17-21 want both between one and three sigma of the receiver, which is not known here.
+        slow_threshold: Th_s, m. Eqs 17-21 want both between one and three sigma of the receiver, which is not known
+            here.
         preset: ``song`` for the published Th_j = 1.5 m and Th_s = 1.28 m.
         arl0: average run length between false alarms, epochs.
 
     Raises:
-        ValueError: thresholds, preset and arl0 exclude each other; one threshold without the other; a value out of range.
+        ValueError: thresholds, preset and arl0 exclude each other; one threshold without the other; a value out of
+            range.
     """
 
     PRESETS = ("song",)
@@ -77,8 +80,12 @@ class Acna(Detector):
         if preset is not None:
             validation.one_of("acna", "preset", preset, self.PRESETS)
         given = jump_threshold is not None
-        self.jump_threshold = validation.above("acna", "jump_threshold", jump_threshold if given else SONG_JUMP_THRESHOLD)
-        self.slow_threshold = validation.above("acna", "slow_threshold", slow_threshold if given else SONG_SLOW_THRESHOLD)
+        self.jump_threshold = validation.above(
+            "acna", "jump_threshold", jump_threshold if given else SONG_JUMP_THRESHOLD
+        )
+        self.slow_threshold = validation.above(
+            "acna", "slow_threshold", slow_threshold if given else SONG_SLOW_THRESHOLD
+        )
         if given or preset is not None:
             self.threshold = 1.0
         else:

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-import numpy as np
-
 from spoofgym import validation
-from spoofgym.detectors.ring import Ring
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Floats, Runs, take_runs
 from spoofgym.navigation.interface import Epoch
 
 
 class Detector(ABC):
     """A test on each epoch of N runs: alarm where the statistic exceeds the threshold.
 
-    A subclass says what it remembers in `bind`, forgets it for some runs in `reset`, and computes its statistic in `update`. A detector
-    with several tests reports the largest statistic_i / threshold_i against 1; calibration scales all of them by one factor, which is
-    then the threshold.
+    A subclass says what it remembers in `bind`, forgets it for some runs in `reset`, and computes its statistic in
+    `update`. A detector with several tests reports the largest statistic_i / threshold_i against 1; calibration scales
+    all of them by one factor, which is then the threshold.
 
     Attributes:
         threshold: alarm where statistic > threshold; None until `bind` or calibration sets it.
-        arl0: the average run length between false alarms at the threshold, in epochs; None if unknown. Unless ``calibrated`` it holds
-            for white innovations (a matched filter) only.
-        target_arl0: the ARL0 that was asked for, to which calibration sets the threshold; None if the threshold was given otherwise.
+        arl0: the average run length between false alarms at the threshold, in epochs; None if unknown. Unless
+            ``calibrated`` it holds for white innovations (a matched filter) only.
+        target_arl0: the ARL0 that was asked for, to which calibration sets the threshold; None if the threshold was
+            given otherwise.
         calibrated: the threshold was set on clean runs, and ``arl0`` holds where they came from.
         memory: epochs that the statistic looks back, the present one left out; a warm start needs as many clean epochs.
     """
@@ -39,10 +37,10 @@ class Detector(ABC):
     def name(self) -> str:
         """The specification that builds this detector."""
 
-    def bind(self, num_runs: int, dimension: int) -> None:
+    def bind(self, num_runs: int, dimension: int) -> None:  # noqa: B027 - a snapshot needs no memory
         """Allocate the memory of ``num_runs`` runs for fixes of ``dimension`` m (3 or 6)."""
 
-    def reset(self, runs: Runs) -> None:
+    def reset(self, runs: Runs) -> None:  # noqa: B027 - a snapshot has nothing to forget
         """Forget everything about these runs."""
 
     @abstractmethod
@@ -60,13 +58,9 @@ class Detector(ABC):
         self.calibrated = True
 
     def take(self, runs: Runs, other: Detector) -> None:
-        """Copy what ``other``, a copy of this detector bound to fewer runs, remembers: its run j becomes run ``runs[j]`` here.
+        """Copy the memory of ``other``, a copy of this detector bound to fewer runs; its run j becomes ``runs[j]``.
 
-        Works on every `Ring` and on every array attribute whose leading axis is the runs, which is how detectors keep their memory.
+        Works on every `Ring` and on every array attribute whose leading axis is the runs, which is how detectors keep
+        their memory.
         """
-        for name, mine in vars(self).items():
-            theirs = getattr(other, name)
-            if isinstance(mine, Ring):
-                mine.take(runs, theirs)
-            elif isinstance(mine, np.ndarray) and mine.ndim and mine is not theirs and len(theirs) == len(runs):
-                mine[runs] = theirs
+        take_runs(self, runs, other)

@@ -1,7 +1,7 @@
 """Chi-square tests of the innovation: of one epoch, and summed over a window.
 
-Under a matched filter the normalised innovation squared of a fix of dimension m is chi-square with m degrees of freedom, and
-independent from epoch to epoch.
+Under a matched filter the normalised innovation squared of a fix of dimension m is chi-square with m degrees of
+freedom, and independent from epoch to epoch.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import numpy as np
 from scipy import special
 
 from spoofgym import validation
+from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.ring import Ring
-from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.interface import Epoch
 from spoofgym.specification import spell
 
@@ -42,8 +42,9 @@ def exceedance(threshold: float, degrees: int) -> float:
 class Snapshot(Detector):
     """Chi-square test of each epoch by itself: statistic nis, alarm above the threshold.
 
-    With nothing given the threshold is the published 25.9 for m = 3 (preset ``shadmehri``), and the quantile at 1e-5 for m = 6. The
-    statistics of a matched filter are independent, so ARL0 = 1 / P_FA exactly, and ``arl0`` needs no simulation there.
+    With nothing given the threshold is the published 25.9 for m = 3 (preset ``shadmehri``), and the quantile at 1e-5
+    for m = 6. The statistics of a matched filter are independent, so ARL0 = 1 / P_FA exactly, and ``arl0`` needs no
+    simulation there.
 
     Args:
         threshold: compared with nis, no unit.
@@ -85,7 +86,8 @@ class Snapshot(Detector):
         """
         if not self.calibrated:
             self.threshold = self._threshold(dimension)
-            self.arl0 = self.target_arl0 or 1.0 / exceedance(self.threshold, dimension)
+            p_fa = exceedance(self.threshold, dimension)
+            self.arl0 = self.target_arl0 or (1.0 / p_fa if p_fa > 0.0 else None)
 
     def update(self, epoch: Epoch) -> Floats:
         """The normalised innovation squared, (N,)."""
@@ -104,20 +106,21 @@ class Snapshot(Detector):
 
 
 class Windowed(Detector):
-    """Chi-square test of a sliding window: statistic is the sum of the nis of the last n epochs, m n degrees of freedom.
+    """Chi-square test of a sliding window: the sum of the nis of the last n epochs, m n degrees of freedom.
 
-    ``n`` counts terms. FOI-R-5687's k counts the epochs before the present one: its test (3) sums k + 1 terms and calls their degrees
-    of freedom 3k. Until n epochs have come the sum is over what there is.
+    ``n`` counts terms. FOI-R-5687's k counts the epochs before the present one: its test (3) sums k + 1 terms and calls
+    their degrees of freedom 3k. Until n epochs have come the sum is over what there is.
 
-    Windows overlap, so ARL0 is not 1 / P_FA: it is calibrated. With nothing given it is 1e5. Thresholds in `WINDOWED_THRESHOLDS` are
-    taken from there; for any other combination ``threshold`` is None until calibration sets it.
+    Windows overlap, so ARL0 is not 1 / P_FA: it is calibrated. With nothing given it is 1e5. Thresholds in
+    `WINDOWED_THRESHOLDS` are taken from there; for any other combination ``threshold`` is None until calibration sets
+    it.
 
     Args:
         n: terms of the sum, epochs.
         threshold: compared with the sum, no unit.
         p_fa: probability that the statistic of one epoch exceeds the threshold; ``arl0`` then stays unknown.
-        preset: ``shadmehri``, the published 25.9 for the mean of the window, so 25.9 n for the sum. It is the quantile of a single
-            epoch: the false-alarm probability of a mean of 5 is 3e-20 instead of 1e-5.
+        preset: ``shadmehri``, the published 25.9 for the mean of the window, so 25.9 n for the sum. It is the quantile
+            of a single epoch: the false-alarm probability of a mean of 5 is 3e-20 instead of 1e-5.
         arl0: average run length between false alarms, epochs.
 
     Raises:

@@ -10,8 +10,9 @@ from spoofgym.arrays import Floats, Runs
 class Ring:
     """The last n values of N runs, zero where fewer have come.
 
-    Every run writes at its own place, which a reset takes back to the start: what a run holds, and in which order, depends on its own
-    episode alone. Reduce ``values`` along axis 1, of fixed length: the result of a run is then bit-identical for any N.
+    Every run writes at its own place, which a reset takes back to the start: what a run holds, and in which order,
+    depends on its own episode alone. Reduce ``values`` along axis 1, of fixed length: the result of a run is then
+    bit-identical for any N.
 
     Attributes:
         values: (N, n), in no particular order.

@@ -1,7 +1,7 @@
 """A checker of vector environments, for spoofgym's own and for anyone's.
 
-Gymnasium and Stable-Baselines3 check single environments only. `check_vector_env` holds a native vector environment to what
-Gymnasium documents and `gymnasium.vector.SyncVectorEnv` does:
+Gymnasium and Stable-Baselines3 check single environments only. `check_vector_env` holds a native vector environment to
+what Gymnasium documents and `gymnasium.vector.SyncVectorEnv` does:
 
     from spoofgym.envs.checker import check_vector_env
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -44,8 +45,8 @@ def check_vector_env(
 
     - the spaces are the batched spaces of the single environment, and every observation lies in them;
     - ``metadata["autoreset_mode"]`` is the mode that was asked for;
-    - lane i equals the single environment seeded ``seed + i``: observation, reward, both flags and infos with their masks,
-      ``final_obs`` and ``final_info``, and in the mode DISABLED resets of some lanes with ``options={"reset_mask": ...}``;
+    - lane i equals the single environment seeded ``seed + i``: observation, reward, both flags, infos with their masks,
+      ``final_obs`` and ``final_info``; in the mode DISABLED with resets of some lanes by ``reset_mask``;
     - a lane is the same for another number of lanes, and for a second run on the same seed;
     - nothing returned shares memory with what an earlier call returned, or is changed by a later call;
     - infos hold no NaN;
@@ -56,12 +57,13 @@ def check_vector_env(
 
     Args:
         make_vector: called with the number of lanes and the autoreset mode, it builds a new vector environment.
-        make_single: builds a new single environment; where the vector environment has a limit of steps, with a `TimeLimit`.
+        make_single: builds a new single environment; with a `TimeLimit` where the vector environment has a
+            limit of steps.
         num_steps: steps in each mode; at least one episode must end in them.
         num_envs: lanes, 2 or more.
         seed: of lane 0.
-        sample_actions: draws the actions of all lanes; by default ``vector_env.action_space.sample()``. The vector environment's
-            ``action_space`` is seeded before.
+        sample_actions: draws the actions of all lanes; by default ``vector_env.action_space.sample()``. That space is
+            seeded before.
 
     Raises:
         AssertionError: something differs; the message says what, in which mode, at which step and in which lane.
@@ -84,9 +86,7 @@ def _check_spaces(make_vector: MakeVector, make_single: MakeSingle, num_envs: in
         assert isinstance(vector, VectorEnv), f"make_vector must build a gymnasium VectorEnv, got {type(vector)}"
         assert vector.num_envs == num_envs, f"num_envs is {vector.num_envs}, asked for {num_envs}"
         told = vector.metadata.get("autoreset_mode")
-        assert isinstance(told, AutoresetMode) and told == mode, (
-            f"metadata['autoreset_mode'] must be {mode!r}, got {told!r}"
-        )
+        assert told is mode, f"metadata['autoreset_mode'] must be {mode!r}, got {told!r}"
         for kind in ("observation_space", "action_space"):
             expected = getattr(single, kind)
             ours, batched = getattr(vector, f"single_{kind}"), getattr(vector, kind)
@@ -122,7 +122,7 @@ class _Singles:
 
     def reset(self, seeds: Sequence[int | None], mask: NDArray[np.bool_]) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = [{} for _ in self.envs]
-        for lane in np.flatnonzero(mask):
+        for lane in np.flatnonzero(mask).tolist():
             self.observations[lane], infos[lane] = self.envs[lane].reset(seed=seeds[lane])
             self.done[lane] = False
         return infos
@@ -232,14 +232,14 @@ def _check_infos(ours: dict[str, Any], expected: list[dict[str, Any]], where: st
     assert isinstance(ours, dict), f"{where}: {key} is {type(ours)}, no dict"
     wanted = {name for info in expected for name in info}
     assert set(ours) == wanted | {f"_{name}" for name in wanted}, (
-        f"{where}: the keys of {key} are {sorted(ours)}; lanes of single environments have {sorted(wanted)}, each with a mask _key"
+        f"{where}: the keys of {key} are {sorted(ours)}; those of single environments are "
+        f"{sorted(wanted)}, each with a mask _key beside it"
     )
     for name in wanted:
         mask, path = ours[f"_{name}"], f"{key}[{name!r}]"
         has = np.array([name in info for info in expected])
-        assert isinstance(mask, np.ndarray) and mask.dtype == np.bool_, (
-            f"{where}: the mask of {path} is no boolean array"
-        )
+        assert isinstance(mask, np.ndarray), f"{where}: the mask of {path} is {type(mask)}, no array"
+        assert mask.dtype == np.bool_, f"{where}: the mask of {path} has dtype {mask.dtype}, not bool"
         assert np.array_equal(mask, has), (
             f"{where}: the mask of {path} is {mask}, lanes of single environments have {has}"
         )
@@ -346,8 +346,10 @@ def _compare(first: Trace, second: Trace, lanes: int, where: str) -> None:
             for name, a, b in zip(names, one[:4], other[:4], strict=True):
                 same = np.array_equal(a[lane], b[lane])
                 assert same, f"{where}: at step {number} {name} of lane {lane} is {b[lane]} instead of {a[lane]}"
-            a, b = _lane(one[4], lane), _lane(other[4], lane)
-            assert _equal(a, b), f"{where}: at step {number} the info of lane {lane} is {b} instead of {a}"
+            info, again = _lane(one[4], lane), _lane(other[4], lane)
+            assert _equal(info, again), (
+                f"{where}: at step {number} the info of lane {lane} is {again} instead of {info}"
+            )
 
 
 def _lane(info: dict[str, Any], lane: int) -> dict[str, Any]:
@@ -411,7 +413,7 @@ def _check_refusals(make_vector: MakeVector, num_envs: int, seed: int, sample: S
             "that is a list": [True] * num_envs,
         }
         for kind, mask in masks.items():
-            _refuses(lambda mask=mask: vector.reset(options={"reset_mask": mask}), f"a reset_mask {kind}")
+            _refuses(partial(vector.reset, options={"reset_mask": mask}), f"a reset_mask {kind}")
         done = ~everyone
         while not done.any():
             _, _, terminated, truncated, _ = vector.step(sample(vector))

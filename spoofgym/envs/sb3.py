@@ -22,7 +22,8 @@ class SB3VecEnv(VecEnv):
     """Adapter of a Gymnasium vector environment in the autoreset mode SAME_STEP.
 
     Observations, rewards, dones, ``terminal_observation`` and ``TimeLimit.truncated`` are bit-equal to those of a
-    `DummyVecEnv` of the single environments. To keep training fast, a lane's info is filled at the end of its episode only.
+    `DummyVecEnv` of the single environments. To keep training fast, a lane's info is filled at the end of its episode
+    only.
 
     Attributes:
         vector_env: the environment that is adapted.
@@ -44,7 +45,7 @@ class SB3VecEnv(VecEnv):
     def reset(self) -> VecEnvObs:
         """Start new episodes in all lanes; seeds given by `seed` are used once."""
         seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
-        observation, info = self.vector_env.reset(seed=seeds)
+        observation, info = self.vector_env.reset(seed=seeds)  # type: ignore[arg-type]
         self.reset_infos = [_lane(info, lane) for lane in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
@@ -59,7 +60,7 @@ class SB3VecEnv(VecEnv):
         observation, reward, terminated, truncated, info = self.vector_env.step(self._actions)
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for lane in np.flatnonzero(done):
+        for lane in np.flatnonzero(done).tolist():
             infos[lane] = _lane(info["final_info"], lane)
             infos[lane]["terminal_observation"] = info["final_obs"][lane]
             infos[lane]["TimeLimit.truncated"] = bool(truncated[lane] and not terminated[lane])

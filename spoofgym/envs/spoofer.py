@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -134,12 +134,12 @@ class SpooferEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `knowledge` | `"shadow"` | what the spoofer knows: "blind", "shadow" or "full" |
     | `action` | `"rate"` | "rate" or "innovation" |
     | `fidelity` | `"linear"` | "linear" (error states, one step per fix) or "strapdown" (IMU rate) |
-    | `on_alarm` | `"end"` | "end": an alarm ends the game; "respond": `response` decides, and the game goes on to its last epoch |
+    | `on_alarm` | `"end"` | "end": an alarm ends the game; "respond": `response` decides and the game goes on |
     | `response` | `"exclude"` | specification or `Response`; used with `on_alarm="respond"` only |
     | `forfeit` | `1.0` | share of the growth that an alarm takes back |
     | `tracking_sigma` | `0.0` | see below, m |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
-    | `render_mode` | `None` | "rgb_array": one figure of ground track, error and statistics (needs `spoofgym[render]`) |
+    | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
     `tracking_sigma`: the spoofer knows the vehicle's position with this white error per axis and epoch, which adds to
     the offset that it means to send, and its velocity with an independent one over the interval. It changes what is
@@ -160,7 +160,7 @@ class SpooferEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     - v0: first release.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """Set the game up; ``arguments`` are those of the environment's page."""
@@ -168,7 +168,7 @@ class SpooferEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise ValueError(f"unknown render_mode {render_mode!r}; valid modes: {self.metadata['render_modes']}")
         self.config = configure(SpooferConfig, arguments)
         self.game = SpooferGame(self.config, 1)
-        self.observation_space = self.game.observation_space
+        self.observation_space = self.game.observation_space  # type: ignore[assignment]
         self.action_space = self.game.action_space
         self.render_mode = render_mode
         self._figure = SpooferFigure(self.game) if render_mode == "rgb_array" else None

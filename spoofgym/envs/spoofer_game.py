@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -133,7 +134,7 @@ class SpooferGame:
         error = self.simulation.error
         return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
 
-    def step(self, actions: Floats, restarting: Runs | None = None) -> Outcome:
+    def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> Outcome:
         """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action.
 
         Args:

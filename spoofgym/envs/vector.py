@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -21,8 +21,8 @@ Observations = NDArray[np.float32]
 class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """N lanes of Spoofer-v0, each bit-identical to the single environment seeded ``seed + i``.
 
-    Observations, rewards, ends and infos are those of a `gymnasium.vector.SyncVectorEnv` of single environments, in all three
-    autoreset modes. Lanes do not depend on their number nor on ``threads``.
+    Observations, rewards, ends and infos are those of a `gymnasium.vector.SyncVectorEnv` of single environments, in all
+    three autoreset modes. Lanes do not depend on their number nor on ``threads``.
 
     Args:
         num_envs: lanes N.
@@ -31,7 +31,7 @@ class SpooferVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]
         arguments: those of Spoofer-v0.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(
         self,

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from numpy import bool_
-from numpy.typing import NDArray
-
-from spoofgym.arrays import Runs
+from spoofgym.arrays import Flags, Runs, take_runs
 from spoofgym.navigation.interface import Decision, Epoch
 
 
@@ -33,10 +30,14 @@ class Response(ABC):
         """Forget everything about these runs."""
 
     @abstractmethod
-    def decide(self, epoch: Epoch, alarm: NDArray[bool_]) -> Decision:
+    def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
         """What becomes of this epoch's fix.
 
         Args:
             epoch: the present one.
             alarm: whether any detector alarms, (N,).
         """
+
+    def take(self, runs: Runs, other: Response) -> None:
+        """Copy the memory of ``other``, a copy of this response bound to fewer runs; its run j becomes ``runs[j]``."""
+        take_runs(self, runs, other)

@@ -1,7 +1,7 @@
 """Initial position, velocity and attitude of a recorded log, from a moving vehicle.
 
-Heading is the course over ground; roll and pitch follow from the mean specific force of a short window less the acceleration that the
-fixes show over it (Groves 2013, sections 5.6.2 and 5.6.3).
+Heading is the course over ground; roll and pitch follow from the mean specific force of a short window less the
+acceleration that the fixes show over it (Groves 2013, sections 5.6.2 and 5.6.3).
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from spoofgym.arrays import Floats
-from spoofgym.geodesy import normal_gravity, position_difference
+from spoofgym.geodesy import normal_gravity
 from spoofgym.navigation.mechanization import attitude_matrix
-from spoofgym.scenarios.log import Fixes, Log
+from spoofgym.scenarios.log import Log, velocity_of
 
-MIN_SPEED = 3.0
+MIN_SPEED = 5.0
 """Slowest speed whose course is trusted as heading, m/s."""
 MAX_TILT = np.radians(60.0)
 """A steeper roll or pitch means a wrong mounting, rad."""
@@ -39,14 +39,6 @@ class Alignment:
     position: Floats
 
 
-def velocity_of(fixes: Fixes) -> Floats:
-    """The receiver's velocity, or central differences of its positions where it gives none, (n, 3), ENU, m/s."""
-    if fixes.velocity is not None:
-        return fixes.velocity
-    track = position_difference(fixes.position, fixes.position[0])
-    return np.asarray(np.gradient(track, fixes.time, axis=0))
-
-
 def align(log: Log) -> Alignment:
     """Align at the first fix from the log's start on at which the vehicle moves.
 
@@ -60,8 +52,8 @@ def align(log: Log) -> Alignment:
     moving = np.flatnonzero(after & (speed >= MIN_SPEED) & (inside > 0) & (inside < len(speed) - 1))
     if len(moving) == 0:
         raise ValueError(
-            f"log {str(log.folder)!r}: the vehicle must move at {MIN_SPEED:g} m/s or more after start_s = {log.start:g} s, "
-            "so that its course gives the heading"
+            f"log {str(log.folder)!r}: the vehicle must move at {MIN_SPEED:g} m/s or more after start_s = "
+            f"{log.start:g} s, so that its course gives the heading"
         )
     fix = int(moving[0])
     course = np.arctan2(velocity[fix, 0], velocity[fix, 1])
@@ -76,7 +68,7 @@ def align(log: Log) -> Alignment:
 
 
 def _level(force: Floats, acceleration: Floats, heading: float, gravity: float, log: Log) -> Floats:
-    """Roll and pitch so that the specific force in ENU is acceleration plus gravity, in a few fixed-point steps; heading given."""
+    """The attitude of this heading that turns the specific force into acceleration plus gravity, by iteration."""
     attitude = attitude_matrix(0.0, 0.0, heading)
     for _ in range(ITERATIONS):
         up = force - attitude.T @ acceleration
@@ -85,7 +77,7 @@ def _level(force: Floats, acceleration: Floats, heading: float, gravity: float, 
         attitude = attitude_matrix(pitch, roll, heading)
     if max(abs(pitch), abs(roll)) > MAX_TILT or abs(np.linalg.norm(up) - gravity) > 0.3 * gravity:
         raise ValueError(
-            f"log {str(log.folder)!r}: at alignment roll is {np.degrees(roll):.0f}° and pitch {np.degrees(pitch):.0f}°: "
-            "imu_to_body_frd does not fit (at rest the down axis reads about -9.8 m/s²)"
+            f"log {str(log.folder)!r}: at alignment roll is {np.degrees(roll):.0f}° and pitch "
+            f"{np.degrees(pitch):.0f}°: imu_to_body_frd does not fit (at rest the down axis reads about -9.8 m/s²)"
         )
     return attitude

@@ -13,7 +13,7 @@ from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import SimulatedScenario
 from spoofgym.sensors.imu import grade
 from spoofgym.sensors.receiver import Receiver
-from spoofgym.specification import Specification
+from spoofgym.specification import spell
 from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly
 
 LIU_END = (math.radians(34.6887), math.radians(108.1915), 2283.0)
@@ -62,7 +62,8 @@ def liu_flight(
 ) -> SimulatedScenario:
     """The Liu flight: aviation-grade INS, single-frequency GPS whose white noise has the filter's own R.
 
-    Settings of the filter: Liu 2018, table 1 and appendix D. The position random walk that the filter believes in (1 m/√h) really acts on
+    Settings of the filter: Liu 2018, table 1 and appendix D. The position random walk that the filter believes in (1
+        m/√h) really acts on
     the INS, so that the filter is matched. Liu's range errors are of a later scenario; here R is white.
 
     Args:
@@ -70,21 +71,21 @@ def liu_flight(
         onset: time of the last clean fix, s.
         rate: of the fixes, Hz.
         imu: name of the IMU grade.
-        markov_sigma: first-order Gauss-Markov receiver noise in the horizontal axes, m; the vertical has R's ratio; unknown to the filter.
+        markov_sigma: first-order Gauss-Markov receiver noise in the horizontal axes, m; the vertical has R's ratio;
+            unknown to the filter.
         markov_time: its correlation time, s.
     """
     sigma = (3.7, 3.7, 6.0)
-    options = {
-        "horizon": (horizon, 120),
-        "onset": (onset, 800.0),
-        "rate": (rate, 1.0),
-        "imu": (imu, "navigation"),
-        "markov_sigma": (markov_sigma, 0.0),
-        "markov_time": (markov_time, 0.0),
-    }
-    given = {key: f"{value:g}" if isinstance(value, float) else str(value) for key, (value, default) in options.items() if value != default}
     return SimulatedScenario(
-        name=str(Specification("liu-flight", None, given)),
+        name=spell(
+            "liu-flight",
+            horizon=None if horizon == 120 else horizon,
+            onset=None if onset == 800.0 else onset,
+            rate=None if rate == 1.0 else rate,
+            imu=None if imu == "navigation" else imu,
+            markov_sigma=markov_sigma or None,
+            markov_time=markov_time or None,
+        ),
         trajectory=_trajectory(),
         grade=grade(imu),
         receiver=Receiver(

@@ -1,7 +1,7 @@
 """Reading a recorded log: inertial samples, GNSS fixes and, where there is one, a reference solution.
 
-A log is a folder in the project's format (docs/log-format.md): north-east-down, degrees, raw sensor axes. It is converted here, at the
-door; everything behind works in east-north-up, right-forward-up and radians.
+A log is a folder in the project's format (docs/log-format.md): north-east-down, degrees, raw sensor axes. It is
+converted here, at the door; everything behind works in east-north-up, right-forward-up and radians.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from spoofgym.arrays import Floats
+from spoofgym.geodesy import displace, position_difference
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -85,15 +87,40 @@ class Log:
     reference: Fixes | None
 
 
+def velocity_of(fixes: Fixes) -> Floats:
+    """The receiver's velocity, or central differences of its positions where it gives none, (n, 3), ENU, m/s."""
+    if fixes.velocity is not None:
+        return fixes.velocity
+    track = position_difference(fixes.position, fixes.position[0])
+    return np.asarray(np.gradient(track, fixes.time, axis=0))
+
+
+def interpolate(solution: Fixes, time: Floats) -> tuple[Floats, Floats]:
+    """A solution at other times, by the cubic that meets its positions and velocities.
+
+    Args:
+        solution: positions in time.
+        time: inside its own times, (n,), s.
+
+    Returns:
+        Position (n, 3) latitude rad, longitude rad, height m, and velocity (n, 3) ENU, m/s.
+    """
+    origin = solution.position[0]
+    spline = CubicHermiteSpline(solution.time, position_difference(solution.position, origin), velocity_of(solution))
+    return displace(origin, spline(time)), spline(time, 1)
+
+
 def read_log(folder: str | Path) -> Log:
     """Read and check a log.
 
     Args:
-        folder: holds ``log.toml``, ``imu.csv``, ``gnss.csv`` and perhaps ``reference.csv``; each table may be gzipped (``.csv.gz``).
+        folder: holds ``log.toml``, ``imu.csv``, ``gnss.csv`` and perhaps ``reference.csv``; tables may be gzipped
+            (``.csv.gz``).
 
     Raises:
-        ValueError: a file or column is missing, a value is not a finite number or out of range, time does not increase (each with file
-            name, and line where there is one), the mounting is unknown, or IMU, fixes and ``start_s`` do not overlap.
+        ValueError: a file or column is missing, a value is not a finite number or out of range, time does not increase
+            (each with file name, and line where there is one), the mounting is unknown, or IMU, fixes and ``start_s``
+            do not overlap.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -134,7 +161,9 @@ def _check_overlap(log: Log) -> None:
             f"{log.fixes.time[0]:g} to {log.fixes.time[-1]:g} s, start_s {log.start:g} s"
         )
     if log.reference is not None and log.reference.time[0] > last:
-        raise ValueError(f"log {str(log.folder)!r}: the reference begins at {log.reference.time[0]:g} s, after the log's end")
+        raise ValueError(
+            f"log {str(log.folder)!r}: the reference begins at {log.reference.time[0]:g} s, after the log's end"
+        )
 
 
 def _read_notes(path: Path) -> dict[str, Any]:
@@ -160,7 +189,9 @@ def _mounting(path: Path, notes: dict[str, Any]) -> Floats:
     value = notes.get("imu_to_body_frd", [])
     if value == []:
         raise ValueError(f"{path}: imu_to_body_frd is empty: a log with unknown mounting is not supported yet")
-    message = f"{path}: imu_to_body_frd must be a rotation, 3 rows of 3 numbers (body forward, right, down), got {value!r}"
+    message = (
+        f"{path}: imu_to_body_frd must be a rotation, 3 rows of 3 numbers (body forward, right, down), got {value!r}"
+    )
     try:
         matrix = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -205,9 +236,7 @@ def _read_fixes(path: Path, delay: float) -> Fixes:
     )
 
 
-def _read_table(
-    path: Path, required: list[tuple[str, ...]], optional: list[tuple[str, ...]]
-) -> dict[str, Floats]:
+def _read_table(path: Path, required: list[tuple[str, ...]], optional: list[tuple[str, ...]]) -> dict[str, Floats]:
     """Columns of a CSV file by their names; each optional group is there as a whole or not at all."""
     lines = _lines(path)
     header = [name.strip() for name in lines[0].split(",")] if lines else []
@@ -270,5 +299,7 @@ def _bad_value(path: Path, lines: list[str], wanted: list[str], places: list[int
             except ValueError:
                 valid = False
             if not valid:
-                return ValueError(f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()!r}")
+                return ValueError(
+                    f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()!r}"
+                )
     return ValueError(f"{path}: cannot be read as a table of numbers")

@@ -1,22 +1,21 @@
 """A recorded drive or flight as a game: real inertial samples and fixes, to which the spoofer adds its offset.
 
-The filter is aligned on the log, run over the clean fixes up to the onset, and goes on from there. A log is one realisation: nothing is
-drawn, and every episode is the same but for what the players do.
+The filter is aligned on the log, run over the clean fixes up to the onset, and goes on from there. A log is one
+realisation: nothing is drawn, and every episode is the same but for what the players do.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
-from spoofgym.geodesy import displace, position_difference
+from spoofgym.geodesy import position_difference
 from spoofgym.navigation.interface import Decision, Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose import StrapdownNavigator
@@ -25,8 +24,8 @@ from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.warm_start import ERROR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
-from spoofgym.scenarios.alignment import Alignment, align, velocity_of
-from spoofgym.scenarios.log import Fixes, Log, read_log
+from spoofgym.scenarios.alignment import Alignment, align
+from spoofgym.scenarios.log import Log, interpolate, read_log, velocity_of
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
@@ -34,13 +33,17 @@ from spoofgym.streams import RunStreams
 
 MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""
-SIGMA_FLOOR = (0.3, 0.3, 0.3, 0.1, 0.1, 0.1)
-"""Smallest 1 sigma that the filter believes of a fix (E, N, U), m and m/s: timing and lever arm are not modelled better than that."""
+SIGMA_FLOOR = 0.3
+"""Smallest 1 sigma that the filter believes of a fix, m and m/s: timing and lever arm are not known better."""
 DEFAULT_SIGMA = (2.5, 2.5, 5.0, 0.3, 0.3, 0.5)
 """1 sigma of a fix whose log states none, m and m/s."""
 ALIGNMENT_SIGMA = (math.radians(5.0), math.radians(5.0), math.radians(10.0))
 """Initial attitude error (E, N, U), rad: course against heading, and a mounting known to some degrees."""
 ALIGNMENT_VELOCITY_SIGMA = (0.5, 0.5, 0.5)
+NOISE_FACTOR = 20.0
+"""The filter's white inertial noise over the data sheet's, for what its model leaves out (presumably scale factor,
+misalignment, vibration). An empirical figure: chosen by the clean errors of four logs, on which it is therefore not
+an independent result, and cautious there (mean NIS well below the fix's dimension)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,7 @@ class RecordedScenario(Scenario):
         log: the recording.
         grade: of the IMU, as the filter believes.
         tuning: what the filter believes beside it; its measurement sigmas hold where the log states none.
+        sigma_floor: smallest 1 sigma of a fix that the filter believes, m and m/s.
         onset: latest time of epoch 0, the last clean fix, s; None = a third of the way from the log's start to its end.
         horizon: epochs of the game; None = to the end of the log.
         drag_off_rate: largest rate of the spoofed position per axis, m/s.
@@ -87,6 +91,7 @@ class RecordedScenario(Scenario):
     log: Log
     grade: ImuGrade
     tuning: FilterTuning
+    sigma_floor: float = SIGMA_FLOOR
     onset: float | None = None
     horizon: int | None = None
     drag_off_rate: tuple[float, float, float] = (4.0, 4.0, 4.0)
@@ -95,7 +100,7 @@ class RecordedScenario(Scenario):
     def __post_init__(self) -> None:
         if self.dimension == 6 and self.log.fixes.velocity is None:
             raise ValueError(f"scenario {self.name!r}: the log gives no velocity (columns vn_mps, ve_mps, vd_mps)")
-        self._check_imu()
+        self._check_imu(self.epoch_time[self.first], self.epoch_time[self.last])
 
     @property
     def dimension(self) -> int:  # type: ignore[override]
@@ -116,12 +121,14 @@ class RecordedScenario(Scenario):
             last = min(last, log.reference.time[-1])
             if log.reference.time[0] > log.fixes.time[first]:
                 raise ValueError(
-                    f"scenario {self.name!r}: the reference begins at {log.reference.time[0]:g} s, after the alignment at "
-                    f"{log.fixes.time[first]:g} s; move start_s in log.toml"
+                    f"scenario {self.name!r}: the reference begins at {log.reference.time[0]:g} s, after the alignment "
+                    f"at {log.fixes.time[first]:g} s; move start_s in log.toml"
                 )
         stop = int(np.searchsorted(log.fixes.time, last, side="right"))
         if stop - first < 4:
-            raise ValueError(f"scenario {self.name!r}: too few fixes after the alignment at {log.fixes.time[first]:g} s")
+            raise ValueError(
+                f"scenario {self.name!r}: too few fixes after the alignment at {log.fixes.time[first]:g} s"
+            )
         return slice(first + 1, stop)
 
     @cached_property
@@ -143,14 +150,15 @@ class RecordedScenario(Scenario):
             onset = min(max(onset, time[0]), time[-2])
         if not time[0] <= onset < time[-1]:
             raise ValueError(
-                f"scenario {self.name!r}: onset {onset:g} s lies outside the log: valid from {time[0]:g} s (the first fix after "
-                f"the alignment) to {time[-2]:g} s"
+                f"scenario {self.name!r}: onset {onset:g} s lies outside the log: valid from {time[0]:g} s (the first "
+                f"fix after the alignment) to {time[-2]:g} s"
             )
         first = int(np.searchsorted(time, onset + 1e-9, side="right")) - 1
         longest = len(time) - 1 - first
         if self.horizon is not None and not 1 <= self.horizon <= longest:
             raise ValueError(
-                f"scenario {self.name!r}: horizon {self.horizon} does not fit: valid from 1 to {longest} epochs after {onset:g} s"
+                f"scenario {self.name!r}: horizon {self.horizon} does not fit: valid from 1 to {longest} epochs after "
+                f"{onset:g} s"
             )
         return first
 
@@ -165,15 +173,15 @@ class RecordedScenario(Scenario):
         time = self.epoch_time[self.first : self.last + 1]
         return Timeline(float(time[0]), float(np.median(np.diff(time))), len(time) - 1)
 
-    def _check_imu(self) -> None:
-        time = self.log.imu_time
-        begin, end = self.log.fixes.time[self.alignment.fix], self.epoch_time[self.last]
+    def _check_imu(self, onset: float, end: float) -> None:
+        time, begin = self.log.imu_time, self.log.fixes.time[self.alignment.fix]
         gaps = np.flatnonzero((np.diff(time) > MAX_IMU_GAP) & (time[1:] > begin) & (time[:-1] < end))
         if len(gaps):
-            at = time[gaps[0]]
+            at, length = time[gaps[0]], time[gaps[0] + 1] - time[gaps[0]]
+            remedy = "a smaller horizon ends the game before it" if at > onset else "a later start_s begins after it"
             raise ValueError(
-                f"scenario {self.name!r}: the IMU has a gap of {time[gaps[0] + 1] - at:.3g} s at {at:g} s; at most {MAX_IMU_GAP:g} s is "
-                f"valid between the alignment at {begin:g} s and the end of the game at {end:g} s (a horizon can end it before)"
+                f"scenario {self.name!r}: the IMU has a gap of {length:.3g} s at {at:g} s; valid is at most "
+                f"{MAX_IMU_GAP:g} s between the alignment at {begin:g} s and the end of the game at {end:g} s; {remedy}"
             )
 
     @cached_property
@@ -230,7 +238,7 @@ class RecordedScenario(Scenario):
             if place < self.dimension:
                 default = np.broadcast_to(self.tuning.measurement_sigma[place : place + 3], size)
                 columns.append(default if stated is None else stated[self._fix])
-        return np.maximum(np.hstack(columns), SIGMA_FLOOR[: self.dimension])
+        return np.maximum(np.hstack(columns), self.sigma_floor)
 
     @cached_property
     def clean(self) -> CleanRun:
@@ -252,7 +260,9 @@ class RecordedScenario(Scenario):
             keep()
         run = CleanRun(*(np.stack(part) for part in zip(*states, strict=True)))
         if not np.all(np.isfinite(run.position)):
-            raise ValueError(f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade")
+            raise ValueError(
+                f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade"
+            )
         return run
 
     @cached_property
@@ -263,8 +273,8 @@ class RecordedScenario(Scenario):
     def _first(self, burn_in: int) -> int:
         if burn_in > self.first:
             raise ValueError(
-                f"scenario {self.name!r}: a detector looks back {burn_in} epochs, but there are {self.first} between the alignment and "
-                f"the onset at {self.timeline.start:g} s: begin later"
+                f"scenario {self.name!r}: a detector looks back {burn_in} epochs, but there are {self.first} between "
+                f"the alignment and the onset at {self.timeline.start:g} s: begin later"
             )
         return self.first - burn_in
 
@@ -295,25 +305,17 @@ class RecordedScenario(Scenario):
     def navigator(
         self, fidelity: str, excludes: bool, burn_in: int, num_runs: int, slices: RunSlices
     ) -> StrapdownNavigator:
-        """A navigator that starts from the clean run's filter just before epoch -burn_in; arguments as in `Scenario`."""
+        """A navigator that starts from the clean run's filter before epoch -burn_in; arguments as in `Scenario`."""
         self.check_fidelity(fidelity)
         first, stop, whole, clean = self._first(burn_in), self.last + 1, self.model, self.clean
-        model = StrapdownModel(
+        model = replace(
+            whole,
             time=whole.time[first:stop],
-            angular_rate=whole.angular_rate,
-            specific_force=whole.specific_force,
-            step=whole.step,
             boundaries=whole.boundaries[first : stop + 1],
             fix_position=whole.fix_position[first:stop],
             fix_velocity=whole.fix_velocity[first:stop],
             true_position=self.true_position[first:stop],
-            lever_arm=whole.lever_arm,
-            latency_samples=whole.latency_samples,
             measurement_covariance=whole.measurement_covariance[first:stop],
-            filter_density=whole.filter_density,
-            true_noise=whole.true_noise,
-            instability_sigma=whole.instability_sigma,
-            instability_decay=whole.instability_decay,
             attitude=clean.attitude[first],
             velocity=clean.velocity[first],
             position=clean.position[first],
@@ -322,7 +324,7 @@ class RecordedScenario(Scenario):
         return StrapdownNavigator(model, num_runs, slices)
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
-        """No error but that of the biases: the samples carry the real ones, the filter those it has estimated, (n, 30)."""
+        """No error but the biases': the samples carry the real ones, the filter its estimates, (n, 30)."""
         initial = np.zeros((len(runs), NUM_JOINT))
         initial[:, ERROR][:, 9:15] = -self.clean.bias[self._first(burn_in)]
         return initial
@@ -332,64 +334,62 @@ class RecordedScenario(Scenario):
         return np.zeros((len(runs), self.last + 1 - self._first(burn_in), self.dimension))
 
 
-def interpolate(solution: Fixes, time: Floats) -> tuple[Floats, Floats]:
-    """A solution at other times, by the cubic that meets its positions and velocities.
-
-    Args:
-        solution: positions in time.
-        time: inside its own times, (n,), s.
-
-    Returns:
-        Position (n, 3) latitude rad, longitude rad, height m, and velocity (n, 3) ENU, m/s.
-    """
-    origin = solution.position[0]
-    spline = CubicHermiteSpline(solution.time, position_difference(solution.position, origin), velocity_of(solution))
-    return displace(origin, spline(time)), spline(time, 1)
-
-
 def recorded(
     path: str,
     grade: str = "automotive",
     onset: float | None = None,
     horizon: int | None = None,
-    velocity: bool = False,
+    velocity: bool | None = None,
+    sigma_floor: float = SIGMA_FLOOR,
+    noise_factor: float = NOISE_FACTOR,
 ) -> RecordedScenario:
     """A log in the project's format as a game.
 
     Args:
         path: folder of the log; no comma in it.
         grade: name of the IMU grade that the filter believes in.
-        onset: time of the last clean fix, s (the last fix up to it is taken); None = a third of the way from the log's start to its end.
+        onset: time of the last clean fix, s (the last fix up to it is taken); None = a third of the way from the log's
+            start to its end.
         horizon: epochs of the game; None = to the end of the log.
-        velocity: whether the filter uses the receiver's velocity beside its position.
+        velocity: whether the filter uses the receiver's velocity beside its position; None = where the log has it.
+        sigma_floor: smallest 1 sigma of a fix that the filter believes, m and m/s.
+        noise_factor: the filter's white inertial noise over the data sheet's.
 
     Raises:
-        ValueError: a path with a comma, an unknown grade, a log that cannot be used, an onset or a horizon outside it.
+        ValueError: a path with a comma, an unknown grade, a log that cannot be used, an onset or a horizon outside it,
+            or a number that is not positive.
     """
     path = str(Path(path))
     if "," in path:
         raise ValueError(f"recorded: a path must not contain a comma, which separates options; got {path!r}")
+    imu = imu_grade(grade)
     if onset is not None:
         onset = validation.finite("recorded", "onset", onset)
-    sigma = DEFAULT_SIGMA if velocity else DEFAULT_SIGMA[:3]
+    sigma_floor = validation.above("recorded", "sigma_floor", sigma_floor)
+    noise_factor = validation.above("recorded", "noise_factor", noise_factor)
+    log = read_log(path)
+    uses_velocity = log.fixes.velocity is not None if velocity is None else velocity
+    options = {
+        "grade": (grade, "automotive"),
+        "onset": (onset, None),
+        "horizon": (horizon, None),
+        "velocity": (velocity, None),
+        "sigma_floor": (sigma_floor, SIGMA_FLOOR),
+        "noise_factor": (noise_factor, NOISE_FACTOR),
+    }
     return RecordedScenario(
-        name=spell(
-            "recorded",
-            path,
-            grade=None if grade == "automotive" else grade,
-            onset=onset,
-            horizon=horizon,
-            velocity=True if velocity else None,
-        ),
-        log=read_log(path),
-        grade=imu_grade(grade),
+        name=spell("recorded", path, **{key: value for key, (value, default) in options.items() if value != default}),
+        log=log,
+        grade=imu,
         tuning=FilterTuning(
             attitude_sigma=ALIGNMENT_SIGMA,
             velocity_sigma=ALIGNMENT_VELOCITY_SIGMA,
             position_sigma=DEFAULT_SIGMA[:3],
             initial_scale=1.0,
-            measurement_sigma=sigma,
+            process_noise_scale=noise_factor**2,
+            measurement_sigma=DEFAULT_SIGMA if uses_velocity else DEFAULT_SIGMA[:3],
         ),
+        sigma_floor=sigma_floor,
         onset=onset,
         horizon=horizon,
     )

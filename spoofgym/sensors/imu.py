@@ -1,6 +1,7 @@
 """IMU grades by their data sheets, and the error processes of an inertial sensor.
 
-The error of each axis is a constant bias, a first-order Gauss-Markov bias instability and white noise (Groves 2013, section 4.4).
+The error of each axis is a constant bias, a first-order Gauss-Markov bias instability and white noise (Groves 2013,
+section 4.4).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The error processes of an IMU against an independent Allan library and the data sheet, and what bad grades are told."""
+"""The error processes of an IMU against an independent Allan library and the data sheet; bad grades."""
 
 import dataclasses
 
@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from spoofgym.sensors.imu import GRADES, ImuGrade, gauss_markov_step, grade, simulate, white_sample
 
+pytestmark = pytest.mark.xdist_group("imu")  # one worker: the long simulation is made once
 HUMP = ImuGrade(
     name="hump",
     gyro_bias=5.0,
@@ -40,12 +41,7 @@ def allan_variance(imu, tau, axis):
 
 
 def degrees_of_freedom(count, step, length):
-    """Spectrum-free oracle of the spread: equivalent degrees of freedom of the non-overlapping Allan variance.
-
-    Successive differences of cluster means are correlated at most with their neighbours for white noise (correlation
-    -1/2: variance of the mean square 3/M instead of 2/M); a Gauss-Markov process whitens them further apart.
-    Four thirds is allowed on top of it.
-    """
+    """Of the non-overlapping Allan variance, rounded down: (M - 1) / 2 for M clusters."""
     clusters = int(count * step / length)
     return (clusters - 1) / 2.0
 

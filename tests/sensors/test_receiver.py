@@ -22,7 +22,7 @@ def fisher_band(pairs):
 
 
 def test_white_noise_has_its_covariance_and_no_memory():
-    """Sums of squares: chi-square; correlations of axes and of neighbours in time: Fisher's z. Less than 1e-9 each of 21."""
+    """Squares: chi-square; correlations of axes and of neighbours in time: Fisher's z. Less than 1e-9 each of 27."""
     receiver = Receiver(white_sigma=tuple(SIGMA), velocity_sigma=(0.1, 0.2, 0.3))
     epochs = 20_000
     noise = draw_noise(receiver, epochs, np.random.default_rng(1), ZERO) / [*SIGMA, 0.1, 0.2, 0.3]

@@ -1,0 +1,207 @@
+"""Attacks on a recorded log: how good the filter is on clean fixes, and what each attack does to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.attacks.base import Attack
+from spoofgym.attacks.profiles import NoAttack
+from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.geodesy import position_difference
+from spoofgym.navigation.mechanization import mechanize
+from spoofgym.scenarios.log import interpolate
+from spoofgym.scenarios.recorded import RecordedScenario
+from spoofgym.simulation import Simulation
+
+SETTLING = 30.0
+"""Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
+SAME_TIME = 1e-3
+"""A reference epoch this close to a fix, s, is that fix and no independent check."""
+
+
+@dataclass(frozen=True)
+class CleanFigures:
+    """The filter on unspoofed fixes, from `SETTLING` after the alignment to the end of the log.
+
+    Attributes:
+        errors: horizontal, against the reference where it is no fix, (n,), m; None = the log has no reference.
+        mean_nis: over the epochs.
+        false_alarms: epochs in which any detector alarms.
+        epochs: how many.
+    """
+
+    errors: Floats | None
+    mean_nis: float
+    false_alarms: int
+    epochs: int
+
+
+def evaluate_recorded(
+    scenario: RecordedScenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
+) -> list[dict[str, Any]]:
+    """Play every attack on the log, every fix used, and compare with the unspoofed run.
+
+    Args:
+        scenario: the log.
+        attacks: in the order of the rows.
+        detectors: each with its threshold set, or with one of its own; an alarm of any counts.
+
+    Returns:
+        A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
+        detected, time_to_detect_s (from the attack's onset to the first alarm after it), error_at_detection_m,
+        max_error_m (largest horizontal error after the onset). None where a thing does not exist: clean errors without
+        a reference, time and error of a detection that did not happen. An alarm without an attack is no detection.
+
+    Raises:
+        ValueError: what `Simulation` refuses, or a log too short for clean figures.
+    """
+    clean = clean_figures(scenario, detectors)
+    common = {
+        "clean_error_median_m": None if clean.errors is None else float(np.median(clean.errors)),
+        "clean_error_p95_m": None if clean.errors is None else float(np.percentile(clean.errors, 95.0)),
+        "mean_nis": clean.mean_nis,
+        "false_alarms": clean.false_alarms,
+        "clean_epochs": clean.epochs,
+    }
+    return [{"attack": attack.name} | common | _play(scenario, attack, detectors) for attack in attacks]
+
+
+def clean_figures(scenario: RecordedScenario, detectors: Sequence[Detector]) -> CleanFigures:
+    """Play the clean log from `SETTLING` after the alignment on, or from where the memory of the detectors is full.
+
+    Raises:
+        ValueError: the log ends before.
+    """
+    time = scenario.epoch_time
+    begin = scenario.log.fixes.time[scenario.alignment.fix] + SETTLING
+    for detector in detectors:
+        detector.bind(1, scenario.dimension)
+    memory = max((detector.memory for detector in detectors), default=0)
+    first = max(int(np.searchsorted(time, begin)), memory)
+    if first > len(time) - 2:
+        raise ValueError(
+            f"scenario {scenario.name!r}: the log ends at {time[-1]:g} s; clean figures need fixes after {begin:g} s "
+            f"and {memory} epochs"
+        )
+    whole = replace(scenario, onset=float(time[first]), horizon=None)
+    simulation = Simulation(whole, None, detectors, seed=0, fidelity="strapdown")
+    epoch = simulation.reset()
+    nis, alarms = [epoch.innovation.nis[0]], [simulation.alarm[0]]
+    for _ in range(whole.timeline.num_epochs):
+        simulation.resolve()
+        nis.append(simulation.observe().innovation.nis[0])
+        alarms.append(simulation.alarm[0])
+    return CleanFigures(
+        errors=held_out_errors(scenario, float(time[first])),
+        mean_nis=float(np.mean(nis)),
+        false_alarms=int(np.sum(alarms)),
+        epochs=len(nis),
+    )
+
+
+def held_out_errors(scenario: RecordedScenario, begin: float) -> Floats | None:
+    """Horizontal error of the clean run at the reference's own times that are no fixes, from ``begin`` on, (n,), m.
+
+    Between the fixes the filter's state is carried on by its inertial samples alone. Where the reference has no epochs
+    of its own, all of them count, after the fix was used; None = there is no reference.
+    """
+    reference = scenario.log.reference
+    if reference is None:
+        return None
+    model, clean = scenario.model, scenario.clean
+    end = scenario.epoch_time[-1]
+    inside = (reference.time >= begin) & (reference.time < end)
+    nearest = np.searchsorted(scenario.epoch_time, reference.time)
+    distance = np.minimum(
+        np.abs(reference.time - scenario.epoch_time[np.minimum(nearest, len(scenario.epoch_time) - 1)]),
+        np.abs(reference.time - scenario.epoch_time[np.maximum(nearest - 1, 0)]),
+    )
+    own = inside & (distance > SAME_TIME)
+    if not own.any():
+        late = scenario.epoch_time >= begin
+        truth, _ = interpolate(reference, scenario.epoch_time[late])
+        return horizontal(position_difference(clean.position[1:][late], truth))
+    position = np.empty((len(model.step), 3))
+    _coast(
+        clean.attitude,
+        clean.velocity,
+        clean.position,
+        clean.bias,
+        model.angular_rate,
+        model.specific_force,
+        model.step,
+        model.boundaries,
+        position,
+    )
+    origin = clean.position[0]
+    start = float(scenario.log.fixes.time[scenario.alignment.fix])
+    ends = start + np.cumsum(model.step)
+    track = position_difference(position, origin)
+    at_fixes = position_difference(clean.position[:-1], origin)
+    errors = []
+    truth = position_difference(reference.position[own], origin)
+    for moment, true in zip(reference.time[own], truth, strict=True):
+        step = min(int(np.searchsorted(ends, moment)), len(ends) - 1)
+        epoch = int(np.searchsorted(model.boundaries, step, side="right")) - 1
+        fresh = step == model.boundaries[epoch]
+        before = at_fixes[epoch] if fresh else track[step - 1]
+        share = 1.0 - (ends[step] - moment) / model.step[step]
+        errors.append(before + share * (track[step] - before) - true)
+    return horizontal(np.array(errors))
+
+
+@njit(cache=True, nogil=True)
+def _coast(
+    attitude: Floats,
+    velocity: Floats,
+    position: Floats,
+    bias: Floats,
+    angular_rate: Floats,
+    specific_force: Floats,
+    step: Floats,
+    boundaries: Runs,
+    result: Floats,
+) -> None:
+    """Position at the end of each step, (n, 3); each epoch's samples start from the state after the fix before it."""
+    c, v, p = np.empty((3, 3)), np.empty(3), np.empty(3)
+    rate, force, unused = np.empty(3), np.empty(3), np.zeros(3)
+    for k in range(len(boundaries) - 1):
+        c[:, :], v[:], p[:] = attitude[k], velocity[k], position[k]
+        for i in range(boundaries[k], boundaries[k + 1]):
+            for a in range(3):
+                rate[a] = angular_rate[i, a] - bias[k, a]
+                force[a] = specific_force[i, a] - bias[k, 3 + a]
+            mechanize(c, v, p, rate, force, step[i], unused)
+            result[i] = p
+
+
+def _play(scenario: RecordedScenario, attack: Attack, detectors: Sequence[Detector]) -> dict[str, Any]:
+    """The part of a row that depends on the attack."""
+    simulation = Simulation(scenario, attack, detectors, seed=0, fidelity="strapdown")
+    onset = scenario.timeline.start if attack.onset is None else attack.onset
+    spoofing = not isinstance(attack, NoAttack)
+    detection: tuple[float, float] | None = None
+    largest = 0.0
+    simulation.reset()
+    simulation.resolve()
+    for _ in range(scenario.timeline.num_epochs):
+        time = float(simulation.observe().time[0])
+        after = time > onset
+        if after and spoofing and detection is None and simulation.alarm[0]:
+            detection = time - onset, float(horizontal(simulation.error)[0])
+        simulation.resolve()
+        if after:
+            largest = max(largest, float(horizontal(simulation.error)[0]))
+    return {
+        "detected": detection is not None,
+        "time_to_detect_s": None if detection is None else detection[0],
+        "error_at_detection_m": None if detection is None else detection[1],
+        "max_error_m": largest,
+    }

@@ -1,0 +1,85 @@
+"""The figure of the spoofer's game."""
+
+import itertools
+import re
+import subprocess
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import spoofgym  # noqa: F401 - registers the environment
+from spoofgym.envs.spoofer import SpooferEnv
+
+pytest.importorskip("matplotlib")
+
+ACTION = np.array([0.2, -0.1, 0.0], dtype=np.float32)
+FAST = np.ones(3, dtype=np.float32)
+
+
+def headline(env: SpooferEnv) -> str:
+    return env._figure._figure.get_suptitle()
+
+
+def test_frames_change_from_step_to_step() -> None:
+    env = gym.make("spoofgym/Spoofer-v0", render_mode="rgb_array")
+    env.reset(seed=0)
+    frames = [env.render()]
+    for _ in range(2):
+        env.step(ACTION)
+        frames.append(env.render())
+    for frame in frames:
+        assert frame.dtype == np.uint8
+        assert frame.shape == (540, 960, 3)
+    for before, after in itertools.pairwise(frames):
+        assert (before != after).any()
+        assert not np.shares_memory(before, after)
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.render(), frames[0])
+    env.close()
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "action", "verdict"),
+    [
+        ({"scenario": "liu-flight:horizon=4"}, 0 * FAST, "Epoch 4 of 4: .* undetected to the end"),
+        ({}, FAST, r"Epoch \d+ of 120: .* DETECTED at epoch \d+ by snapshot"),
+        (
+            {"scenario": "liu-flight:horizon=30", "on_alarm": "respond", "detector": ("snapshot", "windowed")},
+            FAST,
+            r"Epoch 30 of 30: .* DETECTED at epoch \d by (snapshot|windowed)",
+        ),
+    ],
+    ids=["undetected", "detected", "respond"],
+)
+def test_headline_tells_how_the_game_ended(arguments: dict, action: np.ndarray, verdict: str) -> None:
+    env = SpooferEnv(render_mode="rgb_array", **arguments)
+    env.reset(seed=1)
+    env.render()
+    assert "not detected so far" in headline(env)
+    over = False
+    while not over:
+        _, _, over, _, info = env.step(action)
+    env.render()
+    assert re.search(verdict, headline(env))
+    assert f"error {info['error']:.1f} m" in headline(env)
+
+
+def test_no_render_mode_draws_nothing() -> None:
+    env = SpooferEnv()
+    env.reset()
+    assert env.render() is None
+
+
+def test_missing_matplotlib_names_the_extra() -> None:
+    code = (
+        "import sys; sys.modules['matplotlib'] = None\n"
+        "import gymnasium, spoofgym\n"
+        "env = gymnasium.make('spoofgym/Spoofer-v0', scenario='liu-flight:horizon=2'); env.reset()\n"
+        "try: gymnasium.make('spoofgym/Spoofer-v0', render_mode='rgb_array')\n"
+        "except gymnasium.error.DependencyNotInstalled as error: print(error)\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "spoofgym[render]" in result.stdout

@@ -1,0 +1,242 @@
+"""The loop over epochs: run i is the same whatever runs beside it, and what bad input is told."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from spoofgym.attacks.profiles import Ramp, SlowChange
+from spoofgym.detectors.chi_square import Snapshot, Windowed
+from spoofgym.responses.exclude import Exclude
+from spoofgym.scenarios.liu_flight import liu_flight
+from spoofgym.sensors.receiver import Receiver
+from spoofgym.simulation import Simulation
+
+pytestmark = pytest.mark.xdist_group("simulation")
+FIDELITIES = ("linear", "strapdown")
+HORIZON = 5
+
+
+def matched():
+    return liu_flight(onset=30.0, horizon=HORIZON)
+
+
+def coloured():
+    """A filter that is not matched: detectors are burnt in by clean epochs."""
+    base = liu_flight(onset=30.0, horizon=HORIZON, imu="tactical")
+    return dataclasses.replace(base, receiver=Receiver(markov_sigma=(3.0, 3.0, 5.0), markov_time=30.0))
+
+
+def simulation(scenario, runs, fidelity="linear", threads=1, seed=60, attack=True, **options):
+    """With a window whose threshold is so low that some runs alarm in their burn-in and draw again."""
+    options.setdefault("detectors", [Snapshot(), Windowed(4, threshold=22.0)])
+    attack = SlowChange() if attack is True else attack
+    return Simulation(scenario, attack, num_runs=runs, seed=seed, fidelity=fidelity, threads=threads, **options)
+
+
+def snapshot(sim):
+    """Everything that one epoch shows, and the truth, by run."""
+    epoch, innovation = sim.epoch, sim.epoch.innovation
+    parts = [sim.error, sim.offset, epoch.index, epoch.time, innovation.residual, innovation.covariance]
+    parts += [innovation.whitened, innovation.nis, *epoch.statistics.values(), sim.alarm]
+    parts += [sim.navigator.position_covariance, sim.navigator.estimated_bias]
+    return [np.array(part, dtype=float).reshape(sim.num_runs, -1) for part in parts]
+
+
+def record(sim, epochs=HORIZON, episodes=1):
+    """(N, numbers) of whole episodes."""
+    rows = []
+    for _ in range(episodes):
+        sim.reset()
+        rows += snapshot(sim)
+        for _ in range(epochs):
+            sim.resolve()
+            sim.observe()
+            rows += snapshot(sim)
+    return np.hstack(rows)
+
+
+@pytest.mark.parametrize("excludes", [False, True], ids=["use", "exclude"])
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("make", [matched, coloured])
+def test_run_i_is_bit_identical_for_any_number_of_runs_and_threads(make, fidelity, excludes):
+    scenario = make()
+    options = [{"response": Exclude()} if excludes else {} for _ in range(6)]
+    whole = record(simulation(scenario, 64, fidelity, **options[0]), episodes=2)
+    assert np.unique(whole[:, 0]).size == 64
+    assert np.isfinite(whole).all()
+    for (runs, threads), extra in zip([(1, 1), (7, 1), (7, 2), (64, 2)], options[1:], strict=False):
+        part = record(simulation(scenario, runs, fidelity, threads, **extra), episodes=2)
+        np.testing.assert_array_equal(part, whole[:runs])
+    alone = record(simulation(scenario, 1, fidelity, seed=65, **options[5]), episodes=2)
+    np.testing.assert_array_equal(alone, whole[5:6])
+
+
+@pytest.mark.parametrize("excludes", [False, True], ids=["use", "exclude"])
+def test_slices_of_the_linear_fidelity_change_nothing(excludes):
+    """Enough runs that two threads really share them."""
+    one, two = (
+        record(simulation(matched(), 600, threads=threads, response=Exclude() if excludes else None))
+        for threads in (1, 2)
+    )
+    np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("make", [matched, coloured])
+def test_resetting_some_runs_leaves_the_others_alone(make, fidelity):
+    """The runs that are reset play on as in the second episode of a batch that is reset as a whole."""
+    undisturbed = simulation(make(), 6, fidelity)
+    whole = simulation(make(), 6, fidelity)
+    some = simulation(make(), 6, fidelity)
+    again, others = np.array([1, 4]), np.array([0, 2, 3, 5])
+    for sim in (undisturbed, whole, some):
+        sim.reset()
+        for _ in range(2):
+            sim.resolve()
+            sim.observe()
+    whole.reset()
+    some.reset(again)
+    for step in range(4):
+        kept, new, mixed = (snapshot(sim) for sim in (undisturbed, whole, some))
+        for a, b, c in zip(kept, new, mixed, strict=True):
+            np.testing.assert_array_equal(c[others], a[others])
+            np.testing.assert_array_equal(c[again], b[again])
+        if step < 3:
+            for sim in (undisturbed, whole, some):
+                sim.resolve()
+                sim.observe()
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("make", [matched, coloured])
+def test_reset_in_parts_is_a_reset(make, fidelity):
+    whole, parts = (simulation(make(), 5, fidelity) for _ in range(2))
+    whole.reset()
+    for runs in ([3, 0], [], [1], [4, 2]):
+        parts.reset(np.array(runs, dtype=np.int64))
+    for _ in range(2):
+        for a, b in zip(snapshot(whole), snapshot(parts), strict=True):
+            np.testing.assert_array_equal(a, b)
+        for sim in (whole, parts):
+            sim.resolve()
+            sim.observe()
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("make", [matched, coloured])
+def test_two_attackers_on_a_seed_meet_the_same_noise_in_every_episode(make, fidelity):
+    """First episodes of different length and offset, one attacker drawing numbers; the second episodes are clean."""
+    quiet, loud = simulation(make(), 4, fidelity, attack=None), simulation(make(), 4, fidelity)
+    for sim, epochs in ((quiet, 2), (loud, HORIZON)):
+        sim.reset()
+        for _ in range(epochs):
+            sim.resolve()
+            sim.observe()
+        sim.reset()
+    first = quiet.epoch.innovation.residual.copy()
+    for _ in range(HORIZON):
+        for a, b in zip(snapshot(quiet), snapshot(loud), strict=True):
+            np.testing.assert_array_equal(a, b)
+        for sim in (quiet, loud):
+            sim.resolve()
+            sim.observe(np.zeros((4, 3)))
+    quiet.reset()
+    assert not np.array_equal(quiet.epoch.innovation.residual, first)
+
+
+def test_an_offset_enters_the_fix_with_its_rate():
+    """z falls by the offset, and the velocity's by the offset's change over the interval."""
+    base = matched()
+    sigma = (3.7, 3.7, 6.0, 0.1, 0.1, 0.2)
+    scenario = dataclasses.replace(
+        base,
+        receiver=Receiver(velocity_sigma=sigma[3:]),
+        tuning=dataclasses.replace(base.tuning, measurement_sigma=sigma),
+    )
+    clean, spoofed = (Simulation(scenario, num_runs=2, seed=1) for _ in range(2))
+    for sim in (clean, spoofed):
+        sim.reset()
+        sim.resolve()
+    offset = np.array([[3.0, -2.0, 1.0], [0.0, 0.0, 0.0]])
+    change = spoofed.observe(offset).innovation.residual - clean.observe().innovation.residual
+    np.testing.assert_allclose(change, np.hstack([-offset, -offset]), atol=1e-12)
+    for sim in (clean, spoofed):
+        sim.resolve()
+    before = spoofed.error[0] - clean.error[0]
+    assert (before * offset[0] > 0.0).all()  # the estimate follows the spoofed fix
+    np.testing.assert_array_equal(spoofed.error[1], clean.error[1])
+
+
+def test_the_attack_of_the_simulation_is_the_offset_of_a_caller():
+    own, given = simulation(matched(), 3, attack=Ramp(2.0)), simulation(matched(), 3, attack=None)
+    own.reset()
+    given.reset()
+    for k in range(1, HORIZON + 1):
+        own.resolve()
+        given.resolve()
+        own.observe()
+        given.observe(np.tile([2.0 * k, 0.0, 0.0], (3, 1)))
+        for a, b in zip(snapshot(own), snapshot(given), strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-12)
+
+
+def test_reset_ends_at_a_clean_epoch_zero_without_an_alarm_in_the_burn_in():
+    sim = simulation(coloured(), 32)
+    epoch = sim.reset()
+    np.testing.assert_array_equal(epoch.index, 0)
+    np.testing.assert_array_equal(epoch.time, 30.0)
+    assert not sim.offset.any()
+
+
+def test_observing_beyond_the_end_raises():
+    sim = simulation(matched(), 3)
+    sim.reset()
+    for _ in range(HORIZON):
+        sim.resolve()
+        sim.observe()
+    sim.resolve()
+    with pytest.raises(RuntimeError, match="run 0 has reached its last epoch: reset it"):
+        sim.observe()
+    sim.reset(np.array([0]))
+    with pytest.raises(RuntimeError, match="run 1 has reached its last epoch"):
+        sim.observe()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"detectors": [Windowed(7)]}, "detector 'windowed:n=7' has no threshold yet: calibrate it first"),
+        ({"attack": Ramp(1.0, onset=10.0)}, "onset 10 s lies outside the game, which runs from 30 s to 35 s"),
+        ({"attack": Ramp(1.0, onset=35.0)}, "onset 35 s lies outside the game"),
+        ({"runs": 0}, "num_runs must be 1 or more, got 0"),
+        ({"seed": -1}, "seed must be a non-negative integer or None, got -1"),
+        ({"threads": 0}, "threads must be 1 or more, got 0"),
+        ({"fidelity": "exact"}, "has no fidelity 'exact'; valid fidelities: linear, strapdown"),
+    ],
+)
+def test_bad_input_is_told_what_is_valid(options, message):
+    with pytest.raises(ValueError, match=message):
+        simulation(matched(), **{"runs": 2, **options})
+
+
+def test_thresholds_that_alarm_in_every_burn_in_are_told():
+    sim = simulation(coloured(), 2, detectors=[Windowed(4, threshold=1e-9)])
+    with pytest.raises(RuntimeError, match="2 runs alarm in every clean burn-in: the thresholds are far too low"):
+        sim.reset()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"horizon": 0}, "horizon must be 1 epoch or more, got 0"),
+        ({"onset": 1.0}, "onset 1 s with a horizon of 5 epochs does not fit"),
+        ({"onset": 1096.0}, "valid from 2 to 1095 s"),
+        ({"onset": 30.5}, "onset 30.5 s is no epoch of a receiver at 1 Hz"),
+        ({"drag_off_rate": (4.0, 0.0, 4.0)}, "drag_off_rate and error_scale must be positive"),
+        ({"receiver": Receiver(velocity_sigma=(1.0, 1.0, 1.0))}, "expects fixes of dimension 3, the receiver gives 6"),
+    ],
+)
+def test_a_scenario_that_does_not_fit_is_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        dataclasses.replace(matched(), **changes)
