@@ -15,7 +15,7 @@ Flags = NDArray[np.bool_]
 def take_runs(mine: Any, runs: Runs, theirs: Any) -> None:
     """Copy the memory of an object that serves n runs into one of the same class that serves more.
 
-    Copied are array attributes whose leading axis is the runs, and attributes with a ``take(runs, other)`` of their own.
+    Copied are array attributes whose leading axis is the runs, and attributes with a ``take(runs, other)``.
 
     Args:
         mine: the object that is changed.

@@ -294,8 +294,8 @@ def calibrated(detector: Detector, scenario: Scenario, fidelity: str = "linear")
         return detector
     if not scenario.random:
         raise ValueError(
-            f"detector {detector.name!r} cannot be calibrated in scenario {scenario.name!r}, which has one realisation: "
-            "give it a threshold"
+            f"detector {detector.name!r} cannot be calibrated in scenario {scenario.name!r}, which has one "
+            "realisation: give it a threshold"
         )
     key = (detector.name, scenario.name, fidelity)
     if key not in _KNOWN:

@@ -179,7 +179,8 @@ class SimulatedScenario(Scenario):
 
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
-        return self.onset + self.receiver.interval * np.arange(-burn_in, self.horizon + 1)
+        start = self.onset - burn_in * self.receiver.interval
+        return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
 
     def velocity(self) -> Floats:
         """The true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""

@@ -196,12 +196,13 @@ class Simulation:
         for name, detector in detectors.items():
             statistic = detector.update(epoch)
             epoch.statistics[name] = statistic
+            assert detector.threshold is not None
             alarm |= statistic > detector.threshold
         return alarm
 
     def _merge(self, runs: Runs, part: Epoch) -> None:
         """Put the epoch of some runs beside that of the others."""
-        if len(runs) == self.num_runs:
+        if len(runs) == self.num_runs and (runs == self._all).all():
             self.epoch = part
             return
         whole, innovation = self.epoch, self.epoch.innovation
@@ -265,7 +266,7 @@ class Simulation:
             self._decision = self.response.decide(self.epoch, self.alarm)
 
     def _decide_first(self, runs: Runs, epoch: Epoch) -> None:
-        """A copy of the response that serves these runs alone sees their epoch 0, so that the others see theirs once."""
+        """A copy of the response, for these runs alone, sees their epoch 0; the others see each epoch once."""
         if self.response is not None:
             part = copy.copy(self.response)
             part.bind(len(runs))

@@ -98,7 +98,7 @@ GRADES = {
             accelerometer_random_walk=100.0,
             accelerometer_instability=50.0,
             correlation_time=300.0,
-            source="fibre-optic and quartz tactical class, e.g. Honeywell HG1700 data sheet: 1 deg/h, 0.125 deg/√h, 1 mg",
+            source="class figures, rounded; compare Honeywell HG1700: 1 deg/h, 0.125 deg/√h, 1 mg",
         ),
         ImuGrade(
             name="industrial",
@@ -109,7 +109,7 @@ GRADES = {
             accelerometer_random_walk=200.0,
             accelerometer_instability=50.0,
             correlation_time=300.0,
-            source="calibrated MEMS class, e.g. Analog Devices ADIS16488 data sheet: 5 deg/h instability, 0.3 deg/√h",
+            source="class figures of factory-calibrated MEMS, rounded; compare Analog Devices ADIS16488",
         ),
         ImuGrade(
             name="automotive",
@@ -120,7 +120,7 @@ GRADES = {
             accelerometer_random_walk=300.0,
             accelerometer_instability=200.0,
             correlation_time=300.0,
-            source="consumer MEMS class, e.g. Bosch BMI088 and TDK ICM-20602 data sheets: 0.2 deg/s and 40 mg offsets",
+            source="class figures of consumer MEMS, rounded; compare Bosch BMI088 and TDK ICM-20602",
         ),
     )
 }

@@ -57,8 +57,6 @@ class Receiver:
             )
         if len(self.lever_arm) != 3:
             raise ValueError(f"receiver: lever_arm must be three numbers (R, F, U), got {self.lever_arm!r}")
-        if len(self.lever_arm) != 3:
-            raise ValueError(f"receiver: lever_arm must be three numbers (R, F, U), got {self.lever_arm!r}")
         for value in self.lever_arm:
             validation.finite("receiver", "lever_arm", value)
 

@@ -1,5 +1,6 @@
 """Learned policies: the NumPy network equals torch's, files hold arrays only, damage is told."""
 
+import itertools
 import json
 
 import numpy as np
@@ -17,7 +18,7 @@ FIELDS = spoofer_fields("shadow", 3, ("snapshot",))
 def policy():
     rng = np.random.default_rng(0)
     sizes = [len(FIELDS), 16, 16, 3]
-    weights = tuple(rng.normal(size=(b, a)).astype(np.float32) for a, b in zip(sizes, sizes[1:], strict=False))
+    weights = tuple(rng.normal(size=(b, a)).astype(np.float32) for a, b in itertools.pairwise(sizes))
     biases = tuple(rng.normal(size=b).astype(np.float32) for b in sizes[1:])
     return LearnedSpoofer("x", SpooferConfig(), tuple(field.name for field in FIELDS), weights, biases)
 

@@ -33,13 +33,14 @@ def mechanized(state, rate=RATE, force=FORCE):
 
 def error_between(state, reference):
     rotation = reference[0] @ state[0].T  # I + [φ x]
-    phi = 0.5 * np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    odd = 0.5 * (rotation - rotation.T)
+    phi = np.array([odd[2, 1], odd[0, 2], odd[1, 0]])
     return np.concatenate([phi, state[1] - reference[1], position_difference(state[2], reference[2])])
 
 
 @pytest.fixture(scope="module")
 def dynamics():
-    (attitude, velocity, position), force = mechanized((ATTITUDE, VELOCITY, POSITION))
+    (_, velocity, position), force = mechanized((ATTITUDE, VELOCITY, POSITION))
     matrix = np.empty((9, 9))
     middle = [0.5 * (a + b) for a, b in ((VELOCITY, velocity), (POSITION, position))]
     navigation_dynamics(*middle, force, matrix)
@@ -48,7 +49,7 @@ def dynamics():
 
 @pytest.fixture(scope="module")
 def differences():
-    """Columns (error after one step - error before) / dt by central differences; the bias columns by perturbed measurements."""
+    """Columns (error after one step - error before) / dt, by central differences."""
     reference, _ = mechanized((ATTITUDE, VELOCITY, POSITION))
     columns = []
     for i, size in enumerate(STEPS):
