@@ -258,7 +258,7 @@ class SimulatedScenario(Scenario):
         for place, run in enumerate(runs):
             streams(run, "initial").standard_normal(out=normals[place])
         initial = np.zeros((len(runs), NUM_JOINT))
-        for j in range(NUM_JOINT):
+        for j in np.flatnonzero(factor.any(axis=0)):
             initial += normals[:, j, None] * factor[:, j]
         return initial
 

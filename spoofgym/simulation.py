@@ -27,6 +27,7 @@ class Simulation:
         scenario: what is simulated.
         detectors: by their names, in order.
         navigator: the N filters.
+        slices: the threads.
         epoch: the present epoch of every run, as `observe` left it.
         alarm: whether any detector alarms in the present epoch, (N,).
         offset: what the spoofer added to the present fix, (N, 3), m ENU.
@@ -81,7 +82,8 @@ class Simulation:
         self._white_memory = memory if scenario.matched else 0
         self.burn_in = 0 if scenario.matched else memory
         excludes = response is not None and response.excludes
-        self.navigator = scenario.navigator(fidelity, excludes, self.burn_in, num_runs, RunSlices(threads))
+        self.slices = RunSlices(threads)
+        self.navigator = scenario.navigator(fidelity, excludes, self.burn_in, num_runs, self.slices)
         self._times = scenario.times(self.burn_in)
         self._intervals = np.diff(self._times, prepend=self._times[0] - scenario.timeline.interval)
         self._noise = np.zeros((num_runs, len(self._times), scenario.dimension))

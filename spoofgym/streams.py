@@ -63,6 +63,6 @@ class RunStreams:
                 raise ValueError(f"unknown purpose {purpose!r} of a random stream; valid purposes: {valid}")
             sequence = cast(np.random.SeedSequence, self._parents[run].bit_generator.seed_seq)
             key = (*sequence.spawn_key, PURPOSES.index(purpose))
-            child = np.random.Generator(np.random.PCG64(np.random.SeedSequence(sequence.entropy, spawn_key=key)))
+            child = np.random.Generator(np.random.SFC64(np.random.SeedSequence(sequence.entropy, spawn_key=key)))
             self._children[run, purpose] = child
         return child

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from gymnasium import spaces
+from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats
@@ -70,11 +71,21 @@ class Squash:
     def __init__(self, fields: tuple[Field, ...]) -> None:
         """Keep the scales."""
         self._inverse = np.array([0.0 if field.scale == 0 else 1.0 / field.scale for field in fields])
-        self._plain = np.array([field.scale == 0 for field in fields])
 
     def __call__(self, raw: Floats) -> NDArray[np.float32]:
-        """X / (1 + |x|), (N, D); raw is overwritten in its squashed entries."""
-        scaled = raw * self._inverse
-        squashed = scaled / (1.0 + np.abs(scaled))
-        squashed[:, self._plain] = raw[:, self._plain]
-        return squashed.astype(np.float32)
+        """x / (1 + |x|), (N, D)."""
+        squashed = np.empty(raw.shape, dtype=np.float32)
+        _squash(raw, self._inverse, squashed)
+        return squashed
+
+
+@njit(cache=True, nogil=True)
+def _squash(raw: Floats, inverse: Floats, squashed: NDArray[np.float32]) -> None:
+    """Squash entries of raw (N, D) by the inverse of their scales (D,); an inverse of 0 leaves an entry as it is."""
+    for lane in range(raw.shape[0]):
+        for i in range(raw.shape[1]):
+            if inverse[i] == 0.0:
+                squashed[lane, i] = raw[lane, i]
+            else:
+                scaled = raw[lane, i] * inverse[i]
+                squashed[lane, i] = scaled / (1.0 + abs(scaled))

@@ -17,7 +17,8 @@ from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.parallel import RunSlices
 
-GRAIN = 256
+GRAIN = 4096
+"""Lanes below which a slice is not worth a thread."""
 
 
 class ShadowFilter:
@@ -62,7 +63,7 @@ class ShadowFilter:
                 offset,
                 previous,
                 interval,
-                model.transition,
+                model.transition_columns,
                 model.observation,
                 model.innovation_factor,
                 model.whitened_gain,
@@ -90,14 +91,14 @@ class ShadowFilter:
         return offset
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _advance(
     runs: Runs,
     index: Runs,
     offset: Floats,
     previous: Floats,
     interval: float,
-    transition: Floats,
+    transition_columns: Floats,
     observation: Floats,
     factor: Floats,
     gain: Floats,
@@ -108,23 +109,24 @@ def _advance(
 ) -> None:
     m = observation.shape[1]
     residual, nothing, work = np.empty(m), np.zeros(NUM_STATES), np.empty(NUM_NAVIGATION)
-    last = transition.shape[0] - 1
+    last = transition_columns.shape[0] - 1
     for run in runs:
         k = index[run]
         if k > 0:
             _residual(observation[k], prior[run], offset[run], previous[run], interval, residual)
             kalman.whiten(factor[k], residual, whitened[run])
             for i in range(NUM_STATES):
-                mean[run, i] = prior[run, i] - kalman.correction(gain[k], whitened[run], i)
+                mean[run, i] = prior[run, i]
+            kalman.correct_error(gain[k], whitened[run], mean[run])
         if k < last:
             for i in range(NUM_STATES):
                 prior[run, i] = mean[run, i]
-            kalman.predict_error(transition[k + 1], nothing, prior[run], work)
+            kalman.predict_error(transition_columns[k + 1], nothing, prior[run], work)
             _residual(observation[k + 1], prior[run], offset[run], offset[run], interval, residual)
             kalman.whiten(factor[k + 1], residual, coming[run])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _residual(
     observation: Floats, error: Floats, offset: Floats, previous: Floats, interval: float, residual: Floats
 ) -> None:
@@ -136,7 +138,7 @@ def _residual(
         residual[a] = total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _offset_for(
     index: Runs, whitened: Floats, observation: Floats, factor: Floats, prior: Floats, offset: Floats
 ) -> None:

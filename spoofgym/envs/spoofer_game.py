@@ -18,7 +18,6 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.observation import Squash, observation_space, spoofer_fields
 from spoofgym.envs.shadow import ShadowFilter
-from spoofgym.parallel import RunSlices
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
 from spoofgym.scenarios import make_scenario
@@ -87,7 +86,7 @@ class SpooferGame:
         self.num_lanes = num_lanes
         self.shadow: ShadowFilter | None = None
         if config.knowledge != "blind":
-            self.shadow = ShadowFilter(scenario.linear_model(), num_lanes, RunSlices(config.threads))
+            self.shadow = ShadowFilter(scenario.linear_model(), num_lanes, self.simulation.slices)
         fields = spoofer_fields(config.knowledge, scenario.dimension, tuple(self.simulation.detectors))
         self.fields = fields
         self.observation_space = observation_space(fields)
@@ -99,6 +98,8 @@ class SpooferGame:
         self._velocity = scenario.velocity()
         self._rate = np.array(scenario.drag_off_rate) * scenario.timeline.interval
         self._horizon = scenario.timeline.num_epochs
+        self._interval = scenario.timeline.interval
+        self._tracking_sigma = np.full((num_lanes, 1), config.tracking_sigma)
         self._all = np.arange(num_lanes)
         self._tracking = np.zeros((num_lanes, self._horizon + 1, 6))
         self._alarmed = np.zeros(num_lanes, dtype=bool)
@@ -154,7 +155,7 @@ class SpooferGame:
         simulation.resolve()
         error = self._horizontal()
         previous = self.offset
-        self.offset = self._intend(np.clip(actions, -1.0, 1.0), previous)
+        self.offset = self._intend(np.minimum(np.maximum(actions, -1.0), 1.0), previous)
         if restarting is not None and len(restarting):
             simulation.restart(restarting)
             self.offset[restarting] = 0.0
@@ -169,7 +170,7 @@ class SpooferGame:
             self._begin(restarting)
             error[restarting] = self.error[restarting]
         if self.shadow is not None:
-            self.shadow.advance(epoch.index, self.offset, previous, self.scenario.timeline.interval)
+            self.shadow.advance(epoch.index, self.offset, previous, self._interval)
         return self._score(error)
 
     def _intend(self, actions: Floats, previous: Floats) -> Floats:
@@ -199,25 +200,16 @@ class SpooferGame:
 
     def observation(self) -> NDArray[np.float32]:
         """What each lane's spoofer sees, (N, D)."""
-        epoch, scenario = self.simulation.epoch, self.scenario
-        raw = np.empty((self.num_lanes, len(self.fields)))
-        raw[:, 0:3] = self.offset
-        raw[:, 3] = epoch.index / self._horizon
-        raw[:, 4:7] = self._velocity[epoch.index]
+        epoch = self.simulation.epoch
+        velocity = self._velocity[epoch.index]
         if self.config.tracking_sigma:
-            raw[:, 4:7] += self._tracking[self._all, epoch.index, 3:] / scenario.timeline.interval
-        raw[:, 7] = self.config.tracking_sigma
-        column = 8
+            velocity += self._tracking[self._all, epoch.index, 3:] / self._interval
+        parts = [self.offset, (epoch.index / self._horizon)[:, None], velocity, self._tracking_sigma]
         if self.shadow is not None:
-            m = scenario.dimension
-            for part in (self.shadow.whitened, self.shadow.coming, self.shadow.mean[:, 6:9], self.shadow.mean[:, 3:6]):
-                raw[:, column : column + part.shape[1]] = part
-                column += part.shape[1]
+            mean = self.shadow.mean
+            parts += [self.shadow.whitened, self.shadow.coming, mean[:, 6:9], mean[:, 3:6]]
             if self.config.knowledge == "full":
-                raw[:, column : column + m] = epoch.innovation.whitened
-                column += m
+                parts.append(epoch.innovation.whitened)
                 for statistic, threshold in zip(epoch.statistics.values(), self._thresholds, strict=True):
-                    raw[:, column] = statistic / threshold
-                    raw[:, column + 1] = threshold
-                    column += 2
-        return self._squash(raw)
+                    parts.append(np.stack([statistic / threshold, np.full(self.num_lanes, threshold)], axis=1))
+        return self._squash(np.concatenate(parts, axis=1))

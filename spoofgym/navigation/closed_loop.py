@@ -15,6 +15,9 @@ from spoofgym.sensors.imu import gauss_markov_step, white_sample
 # rows of the state kept when a fix is taken
 POSITION, VELOCITY, FORCE, ATTITUDE = 0, 1, 2, 3
 
+NUM_SAMPLE_NOISES = 6
+NUM_EPOCH_NOISES = 9
+
 
 @njit(cache=True, nogil=True)
 def propagate(
@@ -29,7 +32,6 @@ def propagate(
     covariance: Floats,
     fix: Floats,
     normals: Floats,
-    epoch_normals: Floats,
     angular_rate: Floats,
     specific_force: Floats,
     step: Floats,
@@ -42,18 +44,19 @@ def propagate(
 ) -> None:
     """Carry runs over one epoch: mechanization, covariance, and the state kept when the fix is taken.
 
-    Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (n, samples or 0, 6) and epoch_normals (n, 9) stand
-    at the places of the runs.
+    Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (N, B, W) hold the noise of B epochs
+    in a ring, W = 6 samples + 9 of the epoch, or 0 where the samples have errors of their own.
     """
     rate, force, mean_force, residual_bias = np.empty(3), np.empty(3), np.empty(3), np.empty(6)
     middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
     half_noise = np.zeros((NUM_STATES, NUM_STATES))
-    noisy = normals.shape[1] > 0
-    for place in range(len(runs)):
-        run = runs[place]
+    noisy = normals.shape[2] > 0
+    last = normals.shape[2] - NUM_EPOCH_NOISES
+    for run in runs:
         index[run] += 1
+        noise = normals[run, index[run] % normals.shape[1]]
         start, stop = boundaries[index[run]], boundaries[index[run] + 1]
         middle = start + (stop - start) // 2
         mean_force[:] = 0.0
@@ -74,8 +77,10 @@ def propagate(
                 force[a] = specific_force[i, a] + residual_bias[3 + a]
             if noisy:
                 for a in range(3):
-                    rate[a] += white_sample(true_noise[a], step[i], normals[place, i - start, a])
-                    force[a] += white_sample(true_noise[3 + a], step[i], normals[place, i - start, 3 + a])
+                    rate[a] += white_sample(true_noise[a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + a])
+                    force[a] += white_sample(
+                        true_noise[3 + a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + 3 + a]
+                    )
             mechanize(run_attitude, run_velocity, run_position, rate, force, step[i], mean_force)
             interval += step[i]
         for a in range(3):
@@ -87,8 +92,8 @@ def propagate(
             covariance[run, i, i] += half_noise[i, i]
         kalman.predict_covariance(transition, half_noise, covariance[run], product)
         if noisy:
-            _disturb_position(run_position, true_noise, np.sqrt(interval), epoch_normals[place])
-            _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, epoch_normals[place])
+            _disturb_position(run_position, true_noise, np.sqrt(interval), noise[last:])
+            _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, noise[last:])
         if latency_samples == 0:
             _keep_fix(run_attitude, run_velocity, run_position, fix[run])
         for a in range(3):
@@ -214,20 +219,20 @@ def resolve(
     gain: Floats,
     whitened: Floats,
 ) -> None:
-    """Subtract the estimated error x̂ = U w; P <- P - U U'."""
-    estimate = np.empty(NUM_STATES)
+    """Add the correction -U w, minus the estimated error; P <- P - U U'."""
+    correction = np.empty(NUM_STATES)
     for run in runs:
-        for i in range(NUM_STATES):
-            estimate[i] = kalman.correction(gain[run], whitened[run], i)
-        rotate(attitude[run], estimate[0], estimate[1], estimate[2])
+        correction[:] = 0.0
+        kalman.correct_error(gain[run], whitened[run], correction)
+        rotate(attitude[run], -correction[0], -correction[1], -correction[2])
         for a in range(3):
-            velocity[run, a] -= estimate[3 + a]
+            velocity[run, a] += correction[3 + a]
         latitude, longitude, height = enu_displacement(
-            position[run, 0], position[run, 1], position[run, 2], -estimate[6], -estimate[7], -estimate[8]
+            position[run, 0], position[run, 1], position[run, 2], correction[6], correction[7], correction[8]
         )
         position[run, 0], position[run, 1], position[run, 2] = latitude, longitude, height
         for a in range(6):
-            bias[run, a] += estimate[9 + a]
+            bias[run, a] -= correction[9 + a]
         kalman.update_covariance(gain[run], covariance[run])
 
 

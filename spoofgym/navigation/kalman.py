@@ -23,28 +23,29 @@ N = 9
 FULL = 15
 
 
-@njit(cache=True, nogil=True)
-def predict_error(transition: Floats, noise: Floats, error: Floats, work: Floats) -> None:
-    """X <- Φ x + w.
+@njit(cache=True, nogil=True, error_model="numpy")
+def predict_error(columns: Floats, noise: Floats, error: Floats, work: Floats) -> None:
+    """x <- Φ x + w.
 
     Args:
-        transition: first nine rows of Φ, (9, 15).
+        columns: the first nine rows of Φ, stored by columns so that the inner loop is a vector operation, (15, 9).
         noise: w, (15,).
         error: x, (15,), in place.
         work: (9,).
     """
     for i in range(N):
-        total = noise[i]
-        for j in range(FULL):
-            total += transition[i, j] * error[j]
-        work[i] = total
+        work[i] = noise[i]
+    for j in range(FULL):
+        factor = error[j]
+        for i in range(N):
+            work[i] += columns[j, i] * factor
     for i in range(N):
         error[i] = work[i]
     for i in range(N, FULL):
         error[i] += noise[i]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def predict_covariance(transition: Floats, process_noise: Floats, covariance: Floats, work: Floats) -> None:
     """P <- Φ P Φ' + Q.
 
@@ -76,7 +77,7 @@ def predict_covariance(transition: Floats, process_noise: Floats, covariance: Fl
             covariance[i, j] += process_noise[i, j]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def innovation_covariance(
     covariance: Floats, observation: Floats, noise_covariance: Floats, cross: Floats, innovation: Floats
 ) -> None:
@@ -104,7 +105,7 @@ def innovation_covariance(
             innovation[a, b] = total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cholesky(matrix: Floats, factor: Floats) -> None:
     """Lower L with matrix = L L'; (m, m)."""
     m = matrix.shape[0]
@@ -120,7 +121,7 @@ def cholesky(matrix: Floats, factor: Floats) -> None:
                 factor[j, i] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
     """U = P H' L⁻ᵀ.
 
@@ -138,9 +139,9 @@ def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
             gain[i, a] = total / factor[a, a]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
-    """W = L⁻¹ z, and the NIS w' w.
+    """w = L⁻¹ z, and the NIS w' w.
 
     Args:
         factor: L, (m, m).
@@ -157,7 +158,7 @@ def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
     return nis
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def update_covariance(gain: Floats, covariance: Floats) -> None:
     """P <- P - U U'; gain U (15, m), covariance (15, 15) in place."""
     m = gain.shape[1]
@@ -170,10 +171,10 @@ def update_covariance(gain: Floats, covariance: Floats) -> None:
             covariance[j, i] = total
 
 
-@njit(cache=True, nogil=True)
-def correction(gain: Floats, whitened: Floats, row: int) -> float:
-    """One element of K z = U w."""
-    total = 0.0
+@njit(cache=True, nogil=True, error_model="numpy")
+def correct_error(gain: Floats, whitened: Floats, error: Floats) -> None:
+    """x <- x - K z = x - U w; gain U (15, m), whitened w (m,), error x (15,) in place."""
     for a in range(gain.shape[1]):
-        total += gain[row, a] * whitened[a]
-    return total
+        factor = whitened[a]
+        for i in range(FULL):
+            error[i] -= gain[i, a] * factor

@@ -15,7 +15,9 @@ from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.streams import RunStreams
 
-GRAIN = 256
+GRAIN = 4096
+"""Runs below which a slice of the light kernels is not worth a thread: handing it over takes about 0.1 ms."""
+COVARIANCE_GRAIN = 128
 POSITION = slice(6, 9)
 BIAS = slice(9, 15)
 
@@ -67,7 +69,7 @@ class LinearNavigator:
         self.index[runs] = -1
         self.state[runs] = initial[:, ERROR]
         self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
-        for run in runs:
+        for run in runs.tolist():
             streams(run, "imu").standard_normal(out=self.normals[run])
         if self.bias_steps.shape[1]:
             self._draw_bias_steps(runs, initial[:, INSTABILITY], streams)
@@ -86,7 +88,13 @@ class LinearNavigator:
         model = self.model
         self._slices.call(
             lambda part: _propagate(
-                part, self.index, self.state, model.transition, model.noise_factor, self.normals, self.bias_steps
+                part,
+                self.index,
+                self.state,
+                model.transition_columns,
+                model.noise_columns,
+                self.normals,
+                self.bias_steps,
             ),
             self._all if runs is None else runs,
             GRAIN,
@@ -182,7 +190,7 @@ class OwnCovarianceNavigator(LinearNavigator):
                 part, self.index, self.covariance, model.transition, model.process_noise
             ),
             self._all if runs is None else runs,
-            GRAIN,
+            COVARIANCE_GRAIN,
         )
 
     def innovate(self, deviation: Floats, runs: Runs | None = None) -> Innovation:
@@ -208,7 +216,7 @@ class OwnCovarianceNavigator(LinearNavigator):
                 nis,
             ),
             self._all[: len(runs)],
-            GRAIN,
+            COVARIANCE_GRAIN,
         )
         self._whitened[runs] = whitened
         return Innovation(residual, innovation, whitened, nis)
@@ -218,7 +226,7 @@ class OwnCovarianceNavigator(LinearNavigator):
         self._slices.call(
             lambda part: _correct_own(part, self.state, self.covariance, self._gain, self._whitened),
             (self._all if runs is None else runs)[decision.use],
-            GRAIN,
+            COVARIANCE_GRAIN,
         )
 
     @property
@@ -227,35 +235,36 @@ class OwnCovarianceNavigator(LinearNavigator):
         return self.covariance[:, POSITION, POSITION].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _propagate(
     runs: Runs,
     index: Runs,
     state: Floats,
-    transition: Floats,
-    noise_factor: Floats,
+    transition_columns: Floats,
+    noise_columns: Floats,
     normals: Floats,
     bias_steps: Floats,
 ) -> None:
-    """Index <- index + 1, x <- Φ x + w."""
+    """index <- index + 1, x <- Φ x + w."""
     work, noise = np.empty(NUM_NAVIGATION), np.zeros(NUM_STATES)
     for run in runs:
         index[run] += 1
         k = index[run]
         for i in range(NUM_NAVIGATION):
-            total = 0.0
-            for j in range(i + 1):
-                total += noise_factor[k, i, j] * normals[run, k, j]
-            noise[i] = total
+            noise[i] = 0.0
+        for j in range(NUM_NAVIGATION):
+            factor = normals[run, k, j]
+            for i in range(NUM_NAVIGATION):
+                noise[i] += noise_columns[k, j, i] * factor
         if bias_steps.shape[1] > 0:
             for i in range(6):
                 noise[NUM_NAVIGATION + i] = bias_steps[run, k, i]
-        kalman.predict_error(transition[k], noise, state[run], work)
+        kalman.predict_error(transition_columns[k], noise, state[run], work)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
-    """Z = H x - deviation."""
+    """z = H x - deviation."""
     for a in range(residual.shape[0]):
         total = -deviation[a]
         for j in range(NUM_NAVIGATION):
@@ -263,7 +272,7 @@ def _observe(observation: Floats, state: Floats, deviation: Floats, residual: Fl
         residual[a] = total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _innovate(
     places: Runs,
     runs: Runs,
@@ -283,16 +292,14 @@ def _innovate(
         nis[place] = kalman.whiten(factor[index[run]], residual[place], whitened[place])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _correct_shared(runs: Runs, index: Runs, state: Floats, gain: Floats, whitened: Floats) -> None:
-    """X <- x - U w."""
+    """x <- x - U w."""
     for run in runs:
-        k = index[run]
-        for i in range(NUM_STATES):
-            state[run, i] -= kalman.correction(gain[k], whitened[run], i)
+        kalman.correct_error(gain[index[run]], whitened[run], state[run])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _propagate_covariance(
     runs: Runs, index: Runs, covariance: Floats, transition: Floats, process_noise: Floats
 ) -> None:
@@ -303,7 +310,7 @@ def _propagate_covariance(
         kalman.predict_covariance(transition[k], process_noise[k], covariance[run], work)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _innovate_own(
     places: Runs,
     runs: Runs,
@@ -332,10 +339,9 @@ def _innovate_own(
         nis[place] = kalman.whiten(factor, residual[place], whitened[place])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _correct_own(runs: Runs, state: Floats, covariance: Floats, gain: Floats, whitened: Floats) -> None:
-    """X <- x - U w, P <- P - U U'."""
+    """x <- x - U w, P <- P - U U'."""
     for run in runs:
-        for i in range(NUM_STATES):
-            state[run, i] -= kalman.correction(gain[run], whitened[run], i)
+        kalman.correct_error(gain[run], whitened[run], state[run])
         kalman.update_covariance(gain[run], covariance[run])

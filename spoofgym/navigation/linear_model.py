@@ -8,6 +8,7 @@ in the epoch's length.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -73,6 +74,16 @@ class LinearModel:
     def dimension(self) -> int:
         """m, of the fix."""
         return self.observation.shape[1]
+
+    @cached_property
+    def transition_columns(self) -> Floats:
+        """The first nine rows of each Φ, stored by columns, (K+1, 15, 9)."""
+        return np.ascontiguousarray(self.transition[:, :NUM_NAVIGATION].transpose(0, 2, 1))
+
+    @cached_property
+    def noise_columns(self) -> Floats:
+        """Each noise factor, stored by columns, (K+1, 9, 9)."""
+        return np.ascontiguousarray(self.noise_factor.transpose(0, 2, 1))
 
     @property
     def num_epochs(self) -> int:

@@ -20,9 +20,8 @@ from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 
 GRAIN = 64
-CHUNK = 8
-NUM_SAMPLE_NOISES = 6
-NUM_EPOCH_NOISES = 9
+EPOCHS_DRAWN = 8
+"""Epochs whose sensor noise a run draws at once: few long draws, since each hands the interpreter lock over."""
 
 
 class StrapdownNavigator:
@@ -54,8 +53,10 @@ class StrapdownNavigator:
         self._fix = np.zeros((num_runs, 6, 3))
         self._gain = np.zeros((num_runs, NUM_STATES, m))
         self._whitened = np.zeros((num_runs, m))
-        self._noise: list[np.random.Generator | None] = [None] * num_runs
+        self._generators: dict[int, np.random.Generator] = {}
         self._noisy = bool(np.any(model.true_noise) or np.any(model.instability_sigma))
+        width = closed_loop.NUM_SAMPLE_NOISES * model.max_samples + closed_loop.NUM_EPOCH_NOISES
+        self._normals = np.zeros((num_runs, EPOCHS_DRAWN, width if self._noisy else 0))
         self._slices = slices
         self._all = np.arange(num_runs)
 
@@ -75,7 +76,8 @@ class StrapdownNavigator:
         for run, x in zip(runs, error, strict=True):
             self.attitude[run] = model.attitude
             closed_loop.rotate(self.attitude[run], -x[0], -x[1], -x[2])
-            self._noise[run] = streams(run, "imu").spawn(1)[0] if self._noisy else None
+            if self._noisy:
+                self._generators[int(run)] = streams(run, "imu").spawn(1)[0]
         self._instability[runs] = initial[:, INSTABILITY]
         self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
         self.bias[runs] = self.true_bias[runs] - error[:, 9:15]
@@ -85,40 +87,32 @@ class StrapdownNavigator:
         self._slices.call(self._propagate_slice, self._all if runs is None else runs, 1)
 
     def _propagate_slice(self, runs: Runs) -> None:
-        """Mechanize a few runs at a time, so that the noise of the samples never has to be stored for all."""
         model = self.model
-        normals = np.empty((CHUNK, model.max_samples if self._noisy else 0, NUM_SAMPLE_NOISES))
-        epoch_normals = np.zeros((CHUNK, NUM_EPOCH_NOISES))
-        for first in range(0, len(runs), CHUNK):
-            part = runs[first : first + CHUNK]
-            for place, run in enumerate(part):
-                generator = self._noise[run]
-                if generator is not None:
-                    generator.standard_normal(out=normals[place])
-                    generator.standard_normal(out=epoch_normals[place])
-            closed_loop.propagate(
-                part,
-                self.index,
-                self.attitude,
-                self.velocity,
-                self.position,
-                self.bias,
-                self.true_bias,
-                self._instability,
-                self.covariance,
-                self._fix,
-                normals,
-                epoch_normals,
-                model.angular_rate,
-                model.specific_force,
-                model.step,
-                model.boundaries,
-                model.latency_samples,
-                model.filter_density,
-                model.true_noise,
-                model.instability_sigma,
-                model.instability_decay,
-            )
+        if self._noisy:
+            for run in runs[(self.index[runs] + 1) % EPOCHS_DRAWN == 0].tolist():
+                self._generators[run].standard_normal(out=self._normals[run])
+        closed_loop.propagate(
+            runs,
+            self.index,
+            self.attitude,
+            self.velocity,
+            self.position,
+            self.bias,
+            self.true_bias,
+            self._instability,
+            self.covariance,
+            self._fix,
+            self._normals,
+            model.angular_rate,
+            model.specific_force,
+            model.step,
+            model.boundaries,
+            model.latency_samples,
+            model.filter_density,
+            model.true_noise,
+            model.instability_sigma,
+            model.instability_decay,
+        )
 
     def innovate(self, deviation: Floats, runs: Runs | None = None) -> Innovation:
         """Form the innovation of runs (all by default).

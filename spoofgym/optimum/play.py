@@ -71,14 +71,14 @@ def expected_play(model: LinearModel, offsets: Floats, threshold: float) -> Outc
         raise ValueError("offsets must be finite")
     batch = offsets.shape[:-2]
     plays = np.ascontiguousarray(offsets).reshape(-1, num_epochs, 3)
-    dimension = model.dimension
+    dimension, columns = model.dimension, model.transition_columns
     whitened = np.empty((len(plays), num_epochs, dimension))
     final_error = np.empty((len(plays), 2))
     log_survival, survival, score = (np.empty(len(plays)) for _ in range(3))
     for b, play in enumerate(plays):
         deviations = fix_deviations(model.time, play, dimension)
         _recursion(
-            model.transition,
+            columns,
             model.observation,
             model.innovation_factor,
             model.whitened_gain,
@@ -116,7 +116,7 @@ def fix_deviations(time: Floats, offsets: Floats, dimension: int) -> Floats:
 
 @njit(cache=True, nogil=True)
 def _recursion(
-    transition: Floats,
+    columns: Floats,
     observation: Floats,
     innovation_factor: Floats,
     whitened_gain: Floats,
@@ -127,7 +127,7 @@ def _recursion(
     """The mean error through epochs 1..K (Liu 2018, eqs 32-34).
 
     Args:
-        transition: Φ of the linear model, epochs 0..K, (K+1, 15, 15).
+        columns: the first nine rows of Φ by columns, epochs 0..K, (K+1, 15, 9).
         observation: H, (K+1, m, 9).
         innovation_factor: L, (K+1, m, m).
         whitened_gain: U, (K+1, 15, m).
@@ -138,14 +138,13 @@ def _recursion(
     num_epochs, dimension = deviations.shape
     error, no_noise, work, residual = np.zeros(NUM_STATES), np.zeros(NUM_STATES), np.empty(9), np.empty(dimension)
     for k in range(1, num_epochs + 1):
-        kalman.predict_error(transition[k, :9], no_noise, error, work)
+        kalman.predict_error(columns[k], no_noise, error, work)
         for i in range(dimension):
             residual[i] = -deviations[k - 1, i]
             for j in range(9):
                 residual[i] += observation[k, i, j] * error[j]
         kalman.whiten(innovation_factor[k], residual, whitened[k - 1])
-        for i in range(NUM_STATES):
-            error[i] -= kalman.correction(whitened_gain[k], whitened[k - 1], i)
+        kalman.correct_error(whitened_gain[k], whitened[k - 1], error)
     final_error[:] = error[HORIZONTAL]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.signal import lfilter
@@ -70,7 +71,7 @@ class Receiver:
         """m: 3 for position, 6 with velocity."""
         return 3 if self.velocity_sigma is None else 6
 
-    @property
+    @cached_property
     def white_deviation(self) -> Floats:
         """White noise of the fix, (m,), m and m/s."""
         return np.array([*self.white_sigma, *(self.velocity_sigma or ())], dtype=np.float64)
@@ -104,11 +105,16 @@ def draw_noise(receiver: Receiver, num_epochs: int, rng: np.random.Generator, be
     Returns:
         (E, m), m and m/s.
     """
-    noise = np.zeros((num_epochs, receiver.dimension))
+    colour: Floats | None = None
     if any(receiver.markov_sigma):
         decay = np.exp(-receiver.interval / receiver.markov_time)
         driving = np.sqrt(1.0 - decay**2) * np.array(receiver.markov_sigma) * rng.standard_normal((num_epochs, 3))
-        noise[:, :3], _ = lfilter([1.0], [1.0, -decay], driving, axis=0, zi=(decay * before)[None, :])
-    if receiver.white_deviation.any():
-        noise += receiver.white_deviation * rng.standard_normal(noise.shape)
+        colour, _ = lfilter([1.0], [1.0, -decay], driving, axis=0, zi=(decay * before)[None, :])
+    if not receiver.white_deviation.any():
+        noise = np.zeros((num_epochs, receiver.dimension))
+    else:
+        noise = rng.standard_normal((num_epochs, receiver.dimension))
+        noise *= receiver.white_deviation
+    if colour is not None:
+        noise[:, :3] += colour
     return noise

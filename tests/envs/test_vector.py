@@ -173,7 +173,7 @@ class Faulty(SpooferVectorEnv):
         if self.fault == "buffer handed out":
             self.buffer[:] = observation
             observation = self.buffer
-        if self.fault == "NaN in the info":
+        if self.fault == "NaN in the info" and "reward_terms" in info:
             info["reward_terms"]["growth"][~info["_reward_terms"]] = np.nan
         if self.fault == "no mask" and "_epoch" in info:
             del info["_epoch"]

@@ -63,7 +63,7 @@ def differences():
 @pytest.mark.parametrize("rows", [slice(0, 3), slice(3, 6), slice(6, 9)], ids=["attitude", "velocity", "position"])
 @pytest.mark.parametrize("columns", [slice(0, 3), slice(3, 6), slice(6, 9)], ids=["attitude", "velocity", "position"])
 def test_dynamics_are_the_derivative_of_the_mechanization(dynamics, differences, rows, columns):
-    """Tolerances: a step of 1 ms leaves terms of second order, and dR/dlatitude is neglected in the position columns."""
+    """A step of 1 ms leaves terms of second order; dR/dlatitude is neglected in the position columns."""
     expected, got = differences[rows, columns], dynamics[rows, columns]
     scale = np.max(np.abs(expected))
     assert scale > 0 or np.max(np.abs(got)) == 0

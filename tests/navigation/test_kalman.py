@@ -56,7 +56,7 @@ def test_prediction_is_dense_algebra(seed, m):
     rng = np.random.default_rng(seed)
     error, disturbance = rng.standard_normal(15), rng.standard_normal(15)
     moved = error.copy()
-    kalman.predict_error(np.ascontiguousarray(transition[:9]), disturbance, moved, np.empty(9))
+    kalman.predict_error(np.ascontiguousarray(transition[:9].T), disturbance, moved, np.empty(9))
     np.testing.assert_allclose(moved, transition @ error + disturbance, rtol=1e-12, atol=1e-13)
 
 
@@ -83,8 +83,9 @@ def test_update_is_the_joseph_form(seed, m):
     kalman.update_covariance(gain, updated)
     scale = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(updated / np.outer(scale, scale), joseph / np.outer(scale, scale), atol=1e-9)
-    correction = [kalman.correction(gain, white, row) for row in range(15)]
-    np.testing.assert_allclose(correction / scale, state / scale, atol=1e-8)
+    corrected = np.zeros(15)
+    kalman.correct_error(gain, white, corrected)
+    np.testing.assert_allclose(-corrected / scale, state / scale, atol=1e-8)
     np.testing.assert_allclose(white, standardised, rtol=1e-7)
 
 
