@@ -25,7 +25,7 @@ import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.vector import SpooferVectorEnv
 
-SECONDS = 2.0
+SECONDS = 1.0
 ROUNDS = 3
 NUM_ENVS = (1, 64, 1024)
 RAMP = np.array([0.07, -0.07, 0.0], dtype=np.float32)

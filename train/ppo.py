@@ -33,6 +33,7 @@ class Settings:
 
     Attributes:
         lanes: games played at once.
+        trials: short trainings from different beginnings, an eighth of the steps each, of which the best goes on.
         minibatches: of a rollout, which is one whole game of every lane.
         epochs: passes over a rollout.
         learning_rate: at the start; falls linearly to almost zero at the last step.
@@ -44,6 +45,7 @@ class Settings:
     """
 
     lanes: int = 256
+    trials: int = 3
     minibatches: int = 8
     epochs: int = 10
     learning_rate: float = 2e-3

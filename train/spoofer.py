@@ -1,6 +1,6 @@
 """Train a PPO spoofer.
 
-    python -m train.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --steps 2000000 --seed 0 --out
+    python -m train.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --steps 3200000 --seed 0 --out
     runs/x
 
 Writes into the run folder: the policy (``policy.npz``, arrays only), what it was trained on (``config.json``),
@@ -14,12 +14,14 @@ import argparse
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from stable_baselines3 import PPO
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.learned import CONFIG_FILE
@@ -28,7 +30,7 @@ from spoofgym.scenario import FIDELITIES
 from train.arguments import count, seed_number
 from train.ppo import CHECKPOINT_FILE, Settings, export, load_checkpoint, make_learner, save_checkpoint, write_config
 
-DEFAULT_STEPS = 2_000_000
+DEFAULT_STEPS = 3_200_000
 
 
 def parser() -> argparse.ArgumentParser:
@@ -45,66 +47,65 @@ def parser() -> argparse.ArgumentParser:
     add("--steps", type=count, default=DEFAULT_STEPS, help="GNSS epochs to play (default: %(default)s)")
     add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
     add("--out", type=Path, default=Path("runs/spoofer"), help="run folder (default: %(default)s)")
-    add("--threads", type=count, default=2, help="of the learner and the simulation (default: %(default)s)")
+    add("--threads", type=count, default=1, help="of the learner and the simulation (default: %(default)s)")
     add("--resume", action="store_true", help="go on from the checkpoint in the run folder")
     return result
 
 
 class Watch(BaseCallback):
-    """Progress bar, checkpoints after every tenth of the run, and the policy's mean return."""
+    """Progress bar over trials and training, checkpoints after every tenth of the run, and the mean return.
+
+    Attributes:
+        steps_before: steps of the learners before the present one, which the bar counts, too.
+    """
 
     def __init__(self, config: SpooferConfig, folder: Path, steps: int, console: Console) -> None:
         super().__init__()
         self._config, self._folder, self._steps = config, folder, steps
+        self.steps_before = 0
         self._progress = Progress(
             TextColumn("training"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("steps"),
+            BarColumn(bar_width=20),
+            TextColumn("{task.percentage:>3.0f} %"),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
             TextColumn("{task.fields[result]}"),
             console=console,
         )
-        self._next_checkpoint = 0
+        self._task = self._progress.add_task("training", total=steps, result="")
+        self._next_checkpoint = steps // 10
 
-    def _on_training_start(self) -> None:
-        self._task = self._progress.add_task("training", total=self._steps, completed=self.num_timesteps, result="")
+    def start(self) -> None:
+        """Show the bar."""
         self._progress.start()
-        self._next_checkpoint = self.num_timesteps + self._steps // 10
+
+    def stop(self) -> None:
+        """Leave the terminal as it was."""
+        self._progress.stop()
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_end(self) -> None:
-        episodes = self.model.ep_info_buffer
-        result = ""
-        if episodes:
-            mean = np.mean([episode["r"] for episode in episodes]) * self._scale()
-            result = f"mean undetected error gained {mean:.1f} m"
-        self._progress.update(self._task, completed=min(self.num_timesteps, self._steps), result=result)
+        played = self.steps_before + self.num_timesteps
+        gained = mean_return(self.model) * self._scale()
+        self._progress.update(self._task, completed=min(played, self._steps), result=f"mean gain {gained:.1f} m")
 
     def _scale(self) -> float:
         return float(self.training_env.unwrapped.vector_env.game.scenario.error_scale)  # type: ignore[attr-defined]
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps >= self._next_checkpoint:
-            self._next_checkpoint += self._steps // 10
-            self.keep()
+            self._next_checkpoint = self.num_timesteps + self._steps // 10
+            export(self.model, self._config, self._folder)  # type: ignore[arg-type]
+            save_checkpoint(self.model, self._folder)  # type: ignore[arg-type]
 
-    def _on_training_end(self) -> None:
-        self.stop()
 
-    def stop(self) -> None:
-        """Leave the terminal as it was."""
-        self._progress.stop()
-
-    def keep(self) -> None:
-        """Write policy and checkpoint."""
-        assert isinstance(self.model, PPO)
-        export(self.model, self._config, self._folder)
-        save_checkpoint(self.model, self._folder)
+def mean_return(learner: BaseAlgorithm) -> float:
+    """Mean return of the last hundred games, or 0 before any has ended."""
+    episodes: Any = learner.ep_info_buffer or []
+    return float(np.mean([episode["r"] for episode in episodes])) if episodes else 0.0
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -129,37 +130,87 @@ def main(arguments: list[str] | None = None) -> int:
             threads=options.threads,
         )
         folder.mkdir(parents=True, exist_ok=True)
-        learner = make_learner(config, Settings(), options.seed, folder)
+        settings = Settings()
+        learner = make_learner(config, settings, options.seed, folder)
     except (ValueError, TypeError) as error:
         console.print(f"error: {error}", style="red", markup=False)
         return 2
-    if options.resume:
-        load_checkpoint(learner, folder)
-    write_config(folder, config, Settings(), options.seed, options.steps)
-    return _learn(learner, config, options.steps, folder, console)
+    write_config(folder, config, settings, options.seed, options.steps)
+    training = Training(config, settings, options.seed, options.steps, folder, console, learner)
+    return training.run(options.resume)
 
 
-def _learn(learner: PPO, config: SpooferConfig, steps: int, folder: Path, console: Console) -> int:
-    watch = Watch(config, folder, steps, console)
-    begin, before = time.perf_counter(), learner.num_timesteps
-    interrupted = False
-    try:
-        learner.learn(max(0, steps - before), callback=watch, reset_num_timesteps=before == 0, tb_log_name="ppo")
-    except KeyboardInterrupt:
-        interrupted = True
-        watch.stop()
-    export(learner, config, folder)
-    save_checkpoint(learner, folder)
-    seconds = time.perf_counter() - begin
-    played = learner.num_timesteps - before
-    console.print(
-        f"{'interrupted after' if interrupted else 'trained'} {played:,} steps in {seconds:.0f} s "
-        f"({played / max(seconds, 1e-9):,.0f} steps/s); policy in {folder}",
-        markup=False,
-    )
-    if interrupted:
-        console.print(f"go on with: python -m train.spoofer --resume --out {folder} --steps {steps}", markup=False)
-    return 130 if interrupted else 0
+class Training:
+    """Trials, the training of the best, and what is left of it whenever it ends."""
+
+    def __init__(
+        self,
+        config: SpooferConfig,
+        settings: Settings,
+        seed: int,
+        steps: int,
+        folder: Path,
+        console: Console,
+        learner: PPO,
+    ) -> None:
+        self._config, self._settings, self._seed, self._steps = config, settings, seed, steps
+        self._folder, self._console = folder, console
+        self._learner = learner
+        self._watch = Watch(config, folder, steps, console)
+
+    def run(self, resume: bool) -> int:
+        """Train, or go on from the checkpoint; returns the exit status."""
+        if resume:
+            load_checkpoint(self._learner, self._folder)
+        begin = time.perf_counter()
+        before = self._learner.num_timesteps
+        interrupted = False
+        self._watch.start()
+        try:
+            if not resume:
+                self._try_beginnings()
+            self._learn(self._learner, self._steps - self._watch.steps_before)
+        except KeyboardInterrupt:
+            interrupted = True
+        finally:
+            self._watch.stop()
+        export(self._learner, self._config, self._folder)
+        save_checkpoint(self._learner, self._folder)
+        played = self._watch.steps_before + self._learner.num_timesteps - before
+        seconds = time.perf_counter() - begin
+        self._console.print(
+            f"{'interrupted after' if interrupted else 'trained'} {played:,} steps in {seconds:.0f} s "
+            f"({played / max(seconds, 1e-9):,.0f} steps/s); policy in {self._folder}",
+            markup=False,
+        )
+        if interrupted:
+            self._console.print(
+                f"go on with: python -m train.spoofer --resume --out {self._folder} --steps {self._steps}", markup=False
+            )
+        return 130 if interrupted else 0
+
+    def _try_beginnings(self) -> None:
+        """Short trainings from different beginnings: which direction an attack takes is decided early, by chance."""
+        share = self._steps // (2 * self._settings.trials + 2)
+        first, played = self._learner, 0
+        for trial in range(self._settings.trials):
+            candidate = first
+            if trial:
+                seed = int(np.random.SeedSequence((self._seed, trial)).generate_state(1)[0])
+                candidate = make_learner(self._config, self._settings, seed, self._folder)
+            best, self._learner = self._learner, candidate
+            self._learn(candidate, share)
+            if mean_return(best) > mean_return(candidate):
+                self._learner = best
+            played += candidate.num_timesteps
+            self._watch.steps_before = played
+        self._watch.steps_before = played - self._learner.num_timesteps
+
+    def _learn(self, learner: PPO, steps: int) -> None:
+        """Up to ``steps`` of this learner in all."""
+        done = learner.num_timesteps
+        if steps > done:
+            learner.learn(steps - done, callback=self._watch, reset_num_timesteps=done == 0, tb_log_name="ppo")
 
 
 if __name__ == "__main__":
