@@ -53,18 +53,24 @@ def attackers_table(report: dict[str, Any]) -> Table:
 
 def recorded_table(report: dict[str, Any]) -> Table:
     """A ``"recorded"`` report for the terminal."""
-    table = Table(title=f"{report['scenario']}, {report['detector']['name']}", box=None, padding=(0, 2, 0, 0))
-    table.add_column("attack", no_wrap=True)
+    table = Table(
+        title=f"{report['scenario']}, {report['detector']['name']}",
+        caption="clean: horizontal error, normalised innovation squared, alarms and epochs without an attack; then the "
+        "time to detect the attack, the error at the alarm, and the largest one if every fix is used",
+        box=None,
+        padding=(0, 2, 0, 0),
+    )
+    table.add_column("attack\n", no_wrap=True)
     for title in (
-        "clean\nmedian m",
-        "clean\n95 % m",
+        "clean\nmedian",
+        "\n95 %",
         "mean\nNIS",
         "false\nalarms",
-        "clean\nepochs",
-        "detected\n",
+        "of\nepochs",
+        "found\n",
         "after\ns",
-        "at alarm\nm",
-        "largest\nm",
+        "error\nm",
+        "worst\nm",
     ):
         table.add_column(title, justify="right", no_wrap=True)
     for row in report["rows"]:
