@@ -28,7 +28,7 @@ def attackers_table(report: dict[str, Any]) -> Table:
         "had an alarm; at alarm: mean error then; exact: without simulation",
         box=None, padding=(0, 2, 0, 0),
     )
-    table.add_column("attacker", no_wrap=True)
+    table.add_column("attacker", max_width=14, overflow="fold")
     table.add_column("knows", no_wrap=True)
     for title in ("error\nm", "exact\nm", "detected\n", "median\ns", "at alarm\nm", "of\noptimum"):
         table.add_column(title, justify="right", no_wrap=True)
