@@ -10,10 +10,11 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
-from spoofgym.navigation.interface import Navigator, Timeline
-from spoofgym.navigation.linear import LinearNavigator, OwnCovarianceNavigator
+from spoofgym.navigation.interface import Demands, Navigator, Timeline
+from spoofgym.navigation.linear import LinearNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
 from spoofgym.navigation.loose import StrapdownNavigator
+from spoofgym.navigation.own_covariance import OwnCovarianceNavigator
 from spoofgym.navigation.strapdown_model import strapdown_model
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT, WarmStart, cold_start, warm_up
@@ -54,8 +55,8 @@ class Scenario(ABC):
         """Scenario time of the epochs -burn_in..K, s."""
 
     @abstractmethod
-    def velocity(self) -> Floats:
-        """The true velocity at epochs 0..K, which a spoofer tracks, (K+1, 3), ENU, m/s."""
+    def velocity(self, burn_in: int = 0) -> Floats:
+        """The true velocity at epochs -burn_in..K, which a spoofer tracks, (burn_in + K + 1, 3), ENU, m/s."""
 
     @abstractmethod
     def track(self) -> Floats:
@@ -71,13 +72,13 @@ class Scenario(ABC):
 
     @abstractmethod
     def navigator(
-        self, fidelity: str, excludes: bool, burn_in: int, num_runs: int, slices: RunSlices
+        self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
     ) -> Navigator:
         """A navigator of ``num_runs`` runs whose model starts ``burn_in`` epochs before epoch 0.
 
         Args:
             fidelity: one of `fidelities`.
-            excludes: whether a fix can be left out, so that each run needs a covariance of its own.
+            demands: what the players ask of it.
             burn_in: clean epochs before epoch 0.
             num_runs: N.
             slices: the threads to use.
@@ -182,9 +183,9 @@ class SimulatedScenario(Scenario):
         start = self.onset - burn_in * self.receiver.interval
         return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
 
-    def velocity(self) -> Floats:
-        """The true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
-        return self.trajectory.velocity[np.round(self.times(0) * self.trajectory.rate).astype(int)]
+    def velocity(self, burn_in: int = 0) -> Floats:
+        """The true velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s."""
+        return self.trajectory.velocity[np.round(self.times(burn_in) * self.trajectory.rate).astype(int)]
 
     def track(self) -> Floats:
         """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
@@ -233,13 +234,13 @@ class SimulatedScenario(Scenario):
         return linear_model(dynamics, self.warm_start(burn_in).filter_covariance, self.tuning, timeline)
 
     def navigator(
-        self, fidelity: str, excludes: bool, burn_in: int, num_runs: int, slices: RunSlices
+        self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
     ) -> Navigator:
         """A navigator whose model starts ``burn_in`` epochs before epoch 0; arguments as in `Scenario`."""
         self.check_fidelity(fidelity)
         if fidelity == "linear":
-            kind = OwnCovarianceNavigator if excludes else LinearNavigator
-            return kind(self.linear_model(burn_in), self.grade, self.receiver.interval, num_runs, slices)
+            kind = OwnCovarianceNavigator if demands.excludes else LinearNavigator
+            return kind(self.linear_model(burn_in), self.grade, self.receiver.interval, num_runs, slices, demands)
         model = strapdown_model(
             self.trajectory,
             self.grade,
@@ -249,7 +250,7 @@ class SimulatedScenario(Scenario):
             self.warm_start(burn_in).filter_covariance,
             Timeline(self.times(burn_in)[0], self.receiver.interval, self.horizon + burn_in),
         )
-        return StrapdownNavigator(model, num_runs, slices)
+        return StrapdownNavigator(model, num_runs, slices, demands)
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
         """Joint states of truth and filter just before epoch -burn_in, (n, 30)."""

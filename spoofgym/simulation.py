@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
-from spoofgym.navigation.interface import Clock, Decision, Epoch, Innovation
+from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
+from spoofgym.sensors.confounders import Confounders
 from spoofgym.streams import RunStreams
 
 MAX_REDRAWS = 100
+NO_DEMANDS = Demands()
 
 
 class Simulation:
@@ -31,6 +34,7 @@ class Simulation:
         epoch: the present epoch of every run, as `observe` left it.
         alarm: whether any detector alarms in the present epoch, (N,).
         offset: what the spoofer added to the present fix, (N, 3), m ENU.
+        used: whether the last `resolve` used the fix, (N,).
     """
 
     def __init__(
@@ -44,6 +48,8 @@ class Simulation:
         *,
         fidelity: str = "linear",
         threads: int = 1,
+        demands: Demands = NO_DEMANDS,
+        confounders: Confounders | None = None,
     ) -> None:
         """Set up ``num_runs`` runs seeded ``seed + i``.
 
@@ -56,6 +62,8 @@ class Simulation:
             seed: of run 0; None = fresh entropy.
             fidelity: "linear" or "strapdown".
             threads: for slices of runs.
+            demands: of a defender outside, beside those of detectors and response.
+            confounders: outages and multipath; None = there are none.
 
         Raises:
             ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the
@@ -81,14 +89,21 @@ class Simulation:
         memory = max((detector.memory for detector in detectors), default=0)
         self._white_memory = memory if scenario.matched else 0
         self.burn_in = 0 if scenario.matched else memory
-        excludes = response is not None and response.excludes
+        for part in (*detectors, *((response,) if response is not None else ())):
+            demands |= part.demands
+        self.confounders = confounders
+        if confounders is not None:
+            confounders.bind(scenario.timeline, num_runs, scenario.dimension)
+            demands |= Demands(excludes=True)
         self.slices = RunSlices(threads)
-        self.navigator = scenario.navigator(fidelity, excludes, self.burn_in, num_runs, self.slices)
+        self.navigator = scenario.navigator(fidelity, demands, self.burn_in, num_runs, self.slices)
         self._times = scenario.times(self.burn_in)
+        self._velocity = scenario.velocity(self.burn_in)
         self._intervals = np.diff(self._times, prepend=self._times[0] - scenario.timeline.interval)
         self._noise = np.zeros((num_runs, len(self._times), scenario.dimension))
         self._all = np.arange(num_runs)
         self._decision = Decision(np.ones(num_runs, dtype=bool))
+        self.used = np.zeros(num_runs, dtype=bool)
         self._no_offset = np.zeros((num_runs, 3))
         self.offset = self._no_offset.copy()
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
@@ -98,7 +113,11 @@ class Simulation:
         n, m = self.num_runs, self.scenario.dimension
         innovation = Innovation(np.zeros((n, m)), np.zeros((n, m, m)), np.zeros((n, m)), np.zeros(n))
         statistics = {name: np.zeros(n) for name in self.detectors}
-        return Epoch(np.zeros(n, dtype=np.int64), np.zeros(n), innovation, statistics)
+        available = np.ones(n, dtype=bool)
+        return Epoch(np.zeros(n, dtype=np.int64), np.zeros(n), innovation, statistics, available, self._view(self._all))
+
+    def _view(self, runs: Runs) -> FilterView:
+        return FilterView(self.navigator, self._velocity, runs)
 
     @property
     def error(self) -> Floats:
@@ -136,8 +155,11 @@ class Simulation:
         for detector in bank.values():
             detector.bind(len(runs), self.scenario.dimension)
         self.offset[runs] = 0.0
+        self.used[runs] = False
         if self.attack is not None:
             self.attack.reset(runs, self.streams)
+        if self.confounders is not None:
+            self.confounders.reset(runs, self.streams)
         if self.response is not None:
             self.response.reset(runs)
         pending = np.arange(len(runs))
@@ -154,6 +176,8 @@ class Simulation:
             detector.bind(len(runs), self.scenario.dimension)
         initial = self.scenario.draw_initial(runs, self.burn_in, self.streams)
         self._noise[runs] = self.scenario.draw_receiver_noise(runs, initial, self.burn_in, self.streams)
+        if self.confounders is not None:
+            self._noise[runs, self.burn_in :] += self.confounders.noise[runs]
         self.navigator.reset(runs, initial, self.streams)
         alarmed = np.zeros(len(runs), dtype=bool)
         for epoch in self._white_epochs(runs):
@@ -171,7 +195,10 @@ class Simulation:
         self.navigator.propagate(runs)
         index = self.navigator.index[runs]
         innovation = self.navigator.innovate(self._noise[runs, index], runs)
-        return Epoch(index - self.burn_in, self._times[index], innovation)
+        available = np.ones(len(runs), dtype=bool)
+        return Epoch(
+            index - self.burn_in, self._times[index], innovation, available=available, view=self._view(runs)
+        )
 
     def _white_epochs(self, runs: Runs) -> list[Epoch]:
         """Innovations of a matched filter before epoch 0, which are independent of its state: drawn directly."""
@@ -219,9 +246,14 @@ class Simulation:
         pairs += [(whole.statistics[name], statistic) for name, statistic in part.statistics.items()]
         for target, source in pairs:
             target[runs] = source
+        assert whole.available is not None
+        whole.available[runs] = True if part.available is None else part.available
+        self.epoch = replace(whole, view=self._view(self._all))
 
     def resolve(self, decision: Decision | None = None, runs: Runs | None = None) -> None:
-        """Second half of the present epoch of runs (all by default): use the fix or leave it out.
+        """Second half of the present epoch of runs (all by default): use the fix, leave it out, take fixes back.
+
+        A fix that the receiver does not give is never used.
 
         Args:
             decision: of a defender outside, for these runs; None = the response's, or to use every fix where there is
@@ -229,9 +261,11 @@ class Simulation:
             runs: which.
         """
         if decision is None:
-            decision = self._decision
-            if runs is not None:
-                decision = Decision(decision.use[runs])
+            decision = self._decision if runs is None else self._decision.of(runs)
+        available = self.epoch.available
+        if self.confounders is not None and available is not None:
+            decision = replace(decision, use=decision.use & (available if runs is None else available[runs]))
+        self.used[self._all if runs is None else runs] = decision.use
         self.navigator.resolve(decision, runs)
 
     def observe(self, offset: Floats | None = None) -> Epoch:
@@ -256,11 +290,23 @@ class Simulation:
             deviation[:, 3:] += (offset - self.offset) / self._intervals[following, None]
         self.offset = np.array(offset, dtype=np.float64)
         navigator.propagate()
-        epoch = Epoch(clock.index, clock.time, navigator.innovate(deviation))
+        innovation = navigator.innovate(deviation)
+        available = self._available(clock.index, innovation)
+        epoch = Epoch(clock.index, clock.time, innovation, available=available, view=self._view(self._all))
         self.alarm = self._test(epoch, self.detectors)
         self.epoch = epoch
         self._decide()
         return epoch
+
+    def _available(self, index: Runs, innovation: Innovation) -> Flags:
+        """Whether there is a fix in each run, (N,); where there is none, nobody sees an innovation."""
+        if self.confounders is None:
+            return np.ones(self.num_runs, dtype=bool)
+        available = self.confounders.available[self._all, np.maximum(index, 0)]
+        if not available.all():
+            for part in (innovation.residual, innovation.whitened, innovation.nis):
+                part[~available] = 0.0
+        return available
 
     def _decide(self) -> None:
         """The response sees each epoch once."""
@@ -273,5 +319,5 @@ class Simulation:
             part = copy.copy(self.response)
             part.bind(len(runs))
             part.reset(np.arange(len(runs)))
-            self._decision.use[runs] = part.decide(epoch, self.alarm[runs]).use
+            self._decision = self._decision.put(runs, part.decide(epoch, self.alarm[runs]))
             self.response.take(runs, part)

@@ -12,7 +12,7 @@ from typing import cast
 
 import numpy as np
 
-PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory")
+PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders")
 
 
 class RunStreams:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs, take_runs
-from spoofgym.navigation.interface import Epoch
+from spoofgym.navigation.interface import Demands, Epoch
 
 
 class Detector(ABC):
@@ -23,6 +23,7 @@ class Detector(ABC):
         target_arl0: the ARL0 that was asked for, to which calibration sets the threshold; None if the threshold was
             given otherwise.
         calibrated: the threshold was set on clean runs, and ``arl0`` holds where they came from.
+        demands: what it asks of the navigator beside innovations, e.g. an unaided inertial solution.
         memory: epochs that the statistic looks back, the present one left out; a warm start needs as many clean epochs.
     """
 
@@ -30,6 +31,7 @@ class Detector(ABC):
     arl0: float | None = None
     target_arl0: float | None = None
     calibrated: bool = False
+    demands: Demands = Demands()
     memory: int = 0
 
     @property

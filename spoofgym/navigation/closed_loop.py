@@ -41,17 +41,19 @@ def propagate(
     true_noise: Floats,
     instability_sigma: Floats,
     instability_decay: float,
+    auxiliary: Floats,
 ) -> None:
     """Carry runs over one epoch: mechanization, covariance, and the state kept when the fix is taken.
 
     Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (N, B, W) hold the noise of B epochs
-    in a ring, W = 6 samples + 9 of the epoch, or 0 where the samples have errors of their own.
+    in a ring, W = 6 samples + 9 of the epoch, or 0 where the samples have errors of their own. The unaided solution
+    minus the filter, auxiliary (N, 15), is carried by the same Φ, or is none, (N, 0).
     """
     rate, force, mean_force, residual_bias = np.empty(3), np.empty(3), np.empty(3), np.empty(6)
     middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
-    half_noise = np.zeros((NUM_STATES, NUM_STATES))
+    half_noise, mean = np.zeros((NUM_STATES, NUM_STATES)), np.empty(NUM_NAVIGATION)
     noisy = normals.shape[2] > 0
     last = normals.shape[2] - NUM_EPOCH_NOISES
     for run in runs:
@@ -91,6 +93,8 @@ def propagate(
             half_noise[i, i] = 0.5 * interval * filter_density[i]
             covariance[run, i, i] += half_noise[i, i]
         kalman.predict_covariance(transition, half_noise, covariance[run], product)
+        if auxiliary.shape[1] > 0:
+            kalman.predict_mean(transition, auxiliary[run], mean)
         if noisy:
             _disturb_position(run_position, true_noise, np.sqrt(interval), noise[last:])
             _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, noise[last:])
@@ -144,6 +148,7 @@ def innovate(
     lever_arm: Floats,
     latency: float,
     measurement_covariance: Floats,
+    noise_scale: Floats,
     deviation: Floats,
     innovation: Floats,
     gain: Floats,
@@ -175,12 +180,13 @@ def innovate(
             fix_position[k, 2],
         )
         for a in range(3):
-            residual[place, a] = difference[a] + arm[a] - deviation[place, a]
+            residual[place, a] = difference[a] + arm[a] - deviation[run, a]
         for a in range(3, m):
-            residual[place, a] = fix[run, VELOCITY, a - 3] - fix_velocity[k, a - 3] - deviation[place, a]
+            residual[place, a] = fix[run, VELOCITY, a - 3] - fix_velocity[k, a - 3] - deviation[run, a]
         kalman.innovation_covariance(
             covariance[run], observation, measurement_covariance[k], cross, innovation[place]
         )
+        kalman.scale_noise(noise_scale[place], measurement_covariance[k], innovation[place])
         kalman.cholesky(innovation[place], factor)
         kalman.whitened_gain(cross, factor, gain[run])
         nis[place] = kalman.whiten(factor, residual[place], whitened[place])
@@ -234,6 +240,36 @@ def resolve(
         for a in range(6):
             bias[run, a] -= correction[9 + a]
         kalman.update_covariance(gain[run], covariance[run])
+
+
+@njit(cache=True, nogil=True)
+def reset(
+    runs: Runs,
+    variance: Floats,
+    index: Runs,
+    velocity: Floats,
+    position: Floats,
+    covariance: Floats,
+    measurement_covariance: Floats,
+    residual: Floats,
+) -> None:
+    """Move position, and velocity where the fix has one, by the residual (n, m); their correlations are forgotten."""
+    for place in range(len(runs)):
+        run = runs[place]
+        for a in range(residual.shape[1] - 3):
+            velocity[run, a] -= residual[place, 3 + a]
+            kalman.forget_correlations(3 + a, measurement_covariance[index[run], 3 + a, 3 + a], covariance[run])
+        latitude, longitude, height = enu_displacement(
+            position[run, 0],
+            position[run, 1],
+            position[run, 2],
+            -residual[place, 0],
+            -residual[place, 1],
+            -residual[place, 2],
+        )
+        position[run, 0], position[run, 1], position[run, 2] = latitude, longitude, height
+        for a in range(3):
+            kalman.forget_correlations(6 + a, variance[place], covariance[run])
 
 
 @njit(cache=True, nogil=True)

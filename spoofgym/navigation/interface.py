@@ -7,7 +7,8 @@ north, up.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -75,23 +76,92 @@ class Epoch(Clock):
     """What one epoch knows; never the truth.
 
     Attributes:
-        innovation: of this epoch.
+        innovation: of this epoch; zero in a run whose receiver gives no fix.
         statistics: each detector's statistic by its name, (N,) each; filled in the order of the detectors.
+        available: whether the receiver gives a fix, (N,); None = in every run.
+        view: what else the filter knows; None where an epoch was made without a navigator.
     """
 
     innovation: Innovation
     statistics: dict[str, Floats] = field(default_factory=dict)
+    available: Flags | None = None
+    view: FilterView | None = None
 
 
 @dataclass(frozen=True)
 class Decision:
     """What becomes of the present fix.
 
+    A reset and a scaled noise act on a fix that is used. The order is: backtrack, then reset or use.
+
     Attributes:
         use: apply the fix (True) or leave it out, (N,).
+        backtrack: epochs whose fixes are taken back first, (N,); 0 = none, None = none in any run.
+        reset: the filter's position jumps to the fix (its velocity, too, where the receiver gives one) and has this
+            variance per axis afterwards, (N,), m²; 0 = no reset, None = none in any run.
+        noise_scale: factor on the variance R of the fix, (N,); None = 1 in every run.
     """
 
     use: Flags
+    backtrack: Runs | None = None
+    reset: Floats | None = None
+    noise_scale: Floats | None = None
+
+    def of(self, runs: Runs) -> Decision:
+        """The decisions of some runs only."""
+        return Decision(
+            self.use[runs],
+            None if self.backtrack is None else self.backtrack[runs],
+            None if self.reset is None else self.reset[runs],
+            None if self.noise_scale is None else self.noise_scale[runs],
+        )
+
+    def put(self, runs: Runs, part: Decision) -> Decision:
+        """These decisions with those of some runs exchanged."""
+        use = self.use.copy()
+        use[runs] = part.use
+
+        def exchange(mine: Any, theirs: Any, absent: float) -> Any:
+            if mine is None and theirs is None:
+                return None
+            kind = np.result_type(*(value for value in (mine, theirs) if value is not None))
+            whole = np.full(len(use), absent, dtype=kind) if mine is None else mine.astype(kind)
+            whole[runs] = absent if theirs is None else theirs
+            return whole
+
+        return Decision(
+            use,
+            exchange(self.backtrack, part.backtrack, 0),
+            exchange(self.reset, part.reset, 0.0),
+            exchange(self.noise_scale, part.noise_scale, 1.0),
+        )
+
+
+@dataclass(frozen=True)
+class Demands:
+    """What the players of a game ask of its navigator, beyond using every fix; what nobody asks for is not allocated.
+
+    Attributes:
+        excludes: a fix can be left out, reset to, or weighted: each run has a covariance of its own.
+        history: epochs that a decision can take back; 0 = none. Needs ``excludes``.
+        auxiliary: an inertial solution that no fix has corrected since the episode began.
+    """
+
+    excludes: bool = False
+    history: int = 0
+    auxiliary: bool = False
+
+    def __post_init__(self) -> None:
+        if self.history < 0:
+            raise ValueError(f"history must be 0 epochs or more, got {self.history}")
+        if self.history and not self.excludes:
+            raise ValueError("a history needs a covariance per run: excludes must be True")
+
+    def __or__(self, other: Demands) -> Demands:
+        """What both ask for."""
+        return Demands(
+            self.excludes or other.excludes, max(self.history, other.history), self.auxiliary or other.auxiliary
+        )
 
 
 class Navigator(Protocol):
@@ -103,6 +173,8 @@ class Navigator(Protocol):
     """
 
     index: Runs
+    backtracked: Runs
+    """Epochs that the last `resolve` took back, (N,): the depth decided, cut at what the history holds."""
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes, before the model's first epoch, from joint states (n, 30) of truth and filter."""
@@ -114,11 +186,23 @@ class Navigator(Protocol):
         """Form the innovation of the present epoch."""
 
     def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
-        """Apply the fix where the decision says so."""
+        """Take fixes back, then apply the present one, or reset to it, where the decision says so."""
 
     @property
     def error(self) -> Floats:
         """Estimate minus truth, (N, 3), m ENU."""
+
+    @property
+    def velocity_error(self) -> Floats:
+        """Estimate minus truth, (N, 3), m/s ENU."""
+
+    @property
+    def auxiliary_offset(self) -> Floats:
+        """Position of the unaided inertial solution minus that of the filter, (N, 3), m ENU.
+
+        Raises:
+            RuntimeError: nobody demanded an unaided solution.
+        """
 
     @property
     def position_covariance(self) -> Floats:
@@ -127,3 +211,39 @@ class Navigator(Protocol):
     @property
     def estimated_bias(self) -> Floats:
         """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
+
+
+class FilterView:
+    """What the filter of some runs knows beside its innovation, before the present fix is resolved; never the truth.
+
+    Read it while its epoch is the present one. Every property is computed when it is first asked for.
+    """
+
+    def __init__(self, navigator: Navigator, true_velocity: Floats, runs: Runs) -> None:
+        """Look at ``runs`` of a navigator; ``true_velocity`` at the epochs of its model, (E, 3), carries the estimate."""
+        self._navigator, self._true_velocity, self._runs = navigator, true_velocity, runs
+
+    @cached_property
+    def velocity(self) -> Floats:
+        """Estimated velocity, (N, 3), ENU, m/s."""
+        truth = self._true_velocity[self._navigator.index[self._runs]]
+        return np.asarray(truth + self._navigator.velocity_error[self._runs])
+
+    @cached_property
+    def position_covariance(self) -> Floats:
+        """The filter's own covariance of the position, (N, 3, 3), m²."""
+        return self._navigator.position_covariance[self._runs]
+
+    @cached_property
+    def estimated_bias(self) -> Floats:
+        """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
+        return self._navigator.estimated_bias[self._runs]
+
+    @cached_property
+    def auxiliary_offset(self) -> Floats:
+        """Position of the unaided inertial solution minus that of the filter, (N, 3), m ENU.
+
+        Raises:
+            RuntimeError: nobody demanded an unaided solution.
+        """
+        return self._navigator.auxiliary_offset[self._runs]

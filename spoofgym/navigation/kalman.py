@@ -46,6 +46,23 @@ def predict_error(columns: Floats, noise: Floats, error: Floats, work: Floats) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def predict_mean(transition: Floats, error: Floats, work: Floats) -> None:
+    """x <- Φ x, for a Φ stored by rows.
+
+    Args:
+        transition: first nine rows of Φ, (9, 15).
+        error: x, (15,), in place.
+        work: (9,).
+    """
+    for i in range(N):
+        work[i] = 0.0
+        for j in range(FULL):
+            work[i] += transition[i, j] * error[j]
+    for i in range(N):
+        error[i] = work[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def predict_covariance(transition: Floats, process_noise: Floats, covariance: Floats, work: Floats) -> None:
     """P <- Φ P Φ' + Q.
 
@@ -103,6 +120,24 @@ def innovation_covariance(
             for k in range(N):
                 total += observation[a, k] * cross[k, b]
             innovation[a, b] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def scale_noise(scale: float, noise_covariance: Floats, innovation: Floats) -> None:
+    """S <- S + (scale - 1) R: the innovation covariance of a fix whose R is ``scale`` times larger; (m, m)."""
+    if scale != 1.0:
+        for a in range(innovation.shape[0]):
+            for b in range(innovation.shape[1]):
+                innovation[a, b] += (scale - 1.0) * noise_covariance[a, b]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def forget_correlations(state: int, variance: float, covariance: Floats) -> None:
+    """One state gets a new variance and is correlated with no other; covariance (15, 15) in place."""
+    for i in range(FULL):
+        covariance[state, i] = 0.0
+        covariance[i, state] = 0.0
+    covariance[state, state] = variance
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numba import njit
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
-from spoofgym.navigation.interface import Decision, Innovation
+from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.streams import RunStreams
 
+NO_DEMANDS = Demands()
 GRAIN = 4096
 """Runs below which a slice of the light kernels is not worth a thread: handing it over takes about 0.1 ms."""
-COVARIANCE_GRAIN = 128
+VELOCITY = slice(3, 6)
 POSITION = slice(6, 9)
 BIAS = slice(9, 15)
 
@@ -32,9 +36,20 @@ class LinearNavigator:
         normals: standard normal process noise of the episode, (N, K+1, 9); overwrite it to inject a noise path.
         bias_steps: changes of the biases at each epoch, (N, K+1, 6), or (N, 0, 6) where they are constant.
         true_bias: gyro and accelerometer biases, (N, 6), rad/s and m/s².
+        backtracked: epochs that the last `resolve` took back, (N,).
+        auxiliary: state of the unaided inertial solution minus that of the filter, (N, 15), or (N, 0) if not demanded:
+            both meet the same noise, so that Φ alone carries it.
     """
 
-    def __init__(self, model: LinearModel, grade: ImuGrade, interval: float, num_runs: int, slices: RunSlices) -> None:
+    def __init__(
+        self,
+        model: LinearModel,
+        grade: ImuGrade,
+        interval: float,
+        num_runs: int,
+        slices: RunSlices,
+        demands: Demands = NO_DEMANDS,
+    ) -> None:
         """Allocate ``num_runs`` runs; `reset` starts them.
 
         Args:
@@ -43,6 +58,7 @@ class LinearNavigator:
             interval: between epochs, s.
             num_runs: N.
             slices: the threads to use.
+            demands: of the players.
         """
         epochs = model.num_epochs + 1
         self.model = model
@@ -57,6 +73,8 @@ class LinearNavigator:
         self._slices = slices
         self._all = np.arange(num_runs)
         self._whitened = np.zeros((num_runs, model.dimension))
+        self.backtracked = np.zeros(num_runs, dtype=np.int64)
+        self.auxiliary = np.zeros((num_runs, NUM_STATES if demands.auxiliary else 0))
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0.
@@ -69,6 +87,8 @@ class LinearNavigator:
         self.index[runs] = -1
         self.state[runs] = initial[:, ERROR]
         self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
+        self.backtracked[runs] = 0
+        self.auxiliary[runs] = 0.0
         for run in runs.tolist():
             streams(run, "imu").standard_normal(out=self.normals[run])
         if self.bias_steps.shape[1]:
@@ -99,9 +119,14 @@ class LinearNavigator:
             self._all if runs is None else runs,
             GRAIN,
         )
+        self._follow(self._all if runs is None else runs)
+
+    def _follow(self, runs: Runs) -> None:
+        """Carry what goes along with the error states of runs to the epoch that these have reached."""
         if self.bias_steps.shape[1]:
-            moved = self._all if runs is None else runs
-            self.true_bias[moved] += self.bias_steps[moved, self.index[moved]]
+            self.true_bias[runs] += self.bias_steps[runs, self.index[runs]]
+        if self.auxiliary.shape[1]:
+            _propagate_auxiliary(runs, self.index, self.model.transition_columns, self.auxiliary)
 
     def innovate(self, deviation: Floats, runs: Runs | None = None) -> Innovation:
         """Form the innovation of runs (all by default).
@@ -138,18 +163,47 @@ class LinearNavigator:
         Raises:
             ValueError: a fix is left out, which shared gains cannot follow.
         """
-        if not decision.use.all():
+        others = (decision.backtrack, decision.reset, decision.noise_scale)
+        if not decision.use.all() or any(part is not None for part in others):
             raise ValueError("a fix is left out, but the gains are shared: the navigator needs a covariance per run")
+        with self._keep_auxiliary(self._all if runs is None else runs):
+            self._apply(runs)
+
+    def _apply(self, runs: Runs | None) -> None:
         self._slices.call(
             lambda part: _correct_shared(part, self.index, self.state, self.model.whitened_gain, self._whitened),
             self._all if runs is None else runs,
             GRAIN,
         )
 
+    @contextmanager
+    def _keep_auxiliary(self, runs: Runs) -> Iterator[None]:
+        """Let the filter's state change without moving the unaided solution."""
+        before = self.state[runs] if self.auxiliary.shape[1] else None
+        yield
+        if before is not None:
+            self.auxiliary[runs] += before - self.state[runs]
+
+    @property
+    def auxiliary_offset(self) -> Floats:
+        """Position of the unaided inertial solution minus that of the filter, (N, 3), m ENU.
+
+        Raises:
+            RuntimeError: nobody demanded an unaided solution.
+        """
+        if not self.auxiliary.shape[1]:
+            raise RuntimeError("this navigator has no unaided inertial solution: demand it when it is built")
+        return self.auxiliary[:, POSITION].copy()
+
     @property
     def error(self) -> Floats:
         """Estimate minus truth, (N, 3), m ENU."""
         return self.state[:, POSITION].copy()
+
+    @property
+    def velocity_error(self) -> Floats:
+        """Estimate minus truth, (N, 3), m/s ENU."""
+        return self.state[:, VELOCITY].copy()
 
     @property
     def position_covariance(self) -> Floats:
@@ -160,79 +214,6 @@ class LinearNavigator:
     def estimated_bias(self) -> Floats:
         """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
         return self.true_bias - self.state[:, BIAS]
-
-
-class OwnCovarianceNavigator(LinearNavigator):
-    """N runs of the true error, each with a covariance of its own, because a fix can be left out.
-
-    Attributes:
-        covariance: the filter's P of each run, (N, 15, 15).
-    """
-
-    def __init__(self, model: LinearModel, grade: ImuGrade, interval: float, num_runs: int, slices: RunSlices) -> None:
-        """As for `LinearNavigator`."""
-        super().__init__(model, grade, interval, num_runs, slices)
-        m = model.dimension
-        self.covariance = np.zeros((num_runs, NUM_STATES, NUM_STATES))
-        self._gain = np.zeros((num_runs, NUM_STATES, m))
-
-    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
-        """Start new episodes just before epoch 0, with the filter's warm covariance."""
-        super().reset(runs, initial, streams)
-        self.covariance[runs] = self.model.prior_covariance
-
-    def propagate(self, runs: Runs | None = None) -> None:
-        """Carry runs (all by default) to their next epoch."""
-        super().propagate(runs)
-        model = self.model
-        self._slices.call(
-            lambda part: _propagate_covariance(
-                part, self.index, self.covariance, model.transition, model.process_noise
-            ),
-            self._all if runs is None else runs,
-            COVARIANCE_GRAIN,
-        )
-
-    def innovate(self, deviation: Floats, runs: Runs | None = None) -> Innovation:
-        """Form the innovation of runs (all by default)."""
-        runs = self._all if runs is None else runs
-        residual, whitened, nis = np.empty_like(deviation), np.empty_like(deviation), np.empty(len(runs))
-        innovation = np.empty((len(runs), self.model.dimension, self.model.dimension))
-        model = self.model
-        self._slices.call(
-            lambda part: _innovate_own(
-                part,
-                runs,
-                self.index,
-                self.state,
-                self.covariance,
-                model.observation,
-                model.measurement_covariance,
-                deviation,
-                innovation,
-                self._gain,
-                residual,
-                whitened,
-                nis,
-            ),
-            self._all[: len(runs)],
-            COVARIANCE_GRAIN,
-        )
-        self._whitened[runs] = whitened
-        return Innovation(residual, innovation, whitened, nis)
-
-    def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
-        """Apply the fix where the decision says so; elsewhere the run coasts."""
-        self._slices.call(
-            lambda part: _correct_own(part, self.state, self.covariance, self._gain, self._whitened),
-            (self._all if runs is None else runs)[decision.use],
-            COVARIANCE_GRAIN,
-        )
-
-    @property
-    def position_covariance(self) -> Floats:
-        """The filter's covariance of the position, (N, 3, 3), m²."""
-        return self.covariance[:, POSITION, POSITION].copy()
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -250,20 +231,36 @@ def _propagate(
     for run in runs:
         index[run] += 1
         k = index[run]
-        for i in range(NUM_NAVIGATION):
-            noise[i] = 0.0
-        for j in range(NUM_NAVIGATION):
-            factor = normals[run, k, j]
-            for i in range(NUM_NAVIGATION):
-                noise[i] += noise_columns[k, j, i] * factor
-        if bias_steps.shape[1] > 0:
-            for i in range(6):
-                noise[NUM_NAVIGATION + i] = bias_steps[run, k, i]
+        draw_process_noise(run, k, noise_columns, normals, bias_steps, noise)
         kalman.predict_error(transition_columns[k], noise, state[run], work)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
+def draw_process_noise(
+    run: int, epoch: int, noise_columns: Floats, normals: Floats, bias_steps: Floats, noise: Floats
+) -> None:
+    """The noise w that acts on a run's error up to an epoch, (15,), from the episode's stored normals."""
+    for i in range(NUM_NAVIGATION):
+        noise[i] = 0.0
+    for j in range(NUM_NAVIGATION):
+        factor = normals[run, epoch, j]
+        for i in range(NUM_NAVIGATION):
+            noise[i] += noise_columns[epoch, j, i] * factor
+    if bias_steps.shape[1] > 0:
+        for i in range(6):
+            noise[NUM_NAVIGATION + i] = bias_steps[run, epoch, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _propagate_auxiliary(runs: Runs, index: Runs, transition_columns: Floats, auxiliary: Floats) -> None:
+    """d <- Φ d."""
+    work, nothing = np.empty(NUM_NAVIGATION), np.zeros(NUM_STATES)
+    for run in runs:
+        kalman.predict_error(transition_columns[index[run]], nothing, auxiliary[run], work)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
     """z = H x - deviation."""
     for a in range(residual.shape[0]):
         total = -deviation[a]
@@ -288,7 +285,7 @@ def _innovate(
     """Innovation with shared S; outputs stand at the places of the runs."""
     for place in places:
         run = runs[place]
-        _observe(observation[index[run]], state[run], deviation[place], residual[place])
+        observe(observation[index[run]], state[run], deviation[place], residual[place])
         nis[place] = kalman.whiten(factor[index[run]], residual[place], whitened[place])
 
 
@@ -297,51 +294,3 @@ def _correct_shared(runs: Runs, index: Runs, state: Floats, gain: Floats, whiten
     """x <- x - U w."""
     for run in runs:
         kalman.correct_error(gain[index[run]], whitened[run], state[run])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _propagate_covariance(
-    runs: Runs, index: Runs, covariance: Floats, transition: Floats, process_noise: Floats
-) -> None:
-    """P <- Φ P Φ' + Q."""
-    work = np.empty((NUM_NAVIGATION, NUM_STATES))
-    for run in runs:
-        k = index[run]
-        kalman.predict_covariance(transition[k], process_noise[k], covariance[run], work)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _innovate_own(
-    places: Runs,
-    runs: Runs,
-    index: Runs,
-    state: Floats,
-    covariance: Floats,
-    observation: Floats,
-    measurement_covariance: Floats,
-    deviation: Floats,
-    innovation: Floats,
-    gain: Floats,
-    residual: Floats,
-    whitened: Floats,
-    nis: Floats,
-) -> None:
-    """Innovation with each run's own S, and its whitened gain."""
-    m = observation.shape[1]
-    cross, factor = np.empty((NUM_STATES, m)), np.empty((m, m))
-    for place in places:
-        run = runs[place]
-        k = index[run]
-        _observe(observation[k], state[run], deviation[place], residual[place])
-        kalman.innovation_covariance(covariance[run], observation[k], measurement_covariance, cross, innovation[place])
-        kalman.cholesky(innovation[place], factor)
-        kalman.whitened_gain(cross, factor, gain[run])
-        nis[place] = kalman.whiten(factor, residual[place], whitened[place])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _correct_own(runs: Runs, state: Floats, covariance: Floats, gain: Floats, whitened: Floats) -> None:
-    """x <- x - U w, P <- P - U U'."""
-    for run in runs:
-        kalman.correct_error(gain[run], whitened[run], state[run])
-        kalman.update_covariance(gain[run], covariance[run])

@@ -3,17 +3,21 @@
 Between two fixes each run mechanizes its own noisy samples; at the epoch the error dynamics are formed once, from the
 mean specific force and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order;
 process noise half before, half after Φ). The estimated error is fed back into the mechanization after every used fix.
+
+The history is a ring of the states after each resolved epoch. A backtrack of n epochs restores the state after the fix
+before them and mechanizes the stored inertial samples (their stored noise on the true motion) to the present epoch.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.navigation import closed_loop
 from spoofgym.navigation.error_model import NUM_STATES
-from spoofgym.navigation.interface import Decision, Innovation
+from spoofgym.navigation.interface import Decision, Demands, Innovation
+from spoofgym.navigation.linear import NO_DEMANDS
 from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
@@ -36,12 +40,19 @@ class StrapdownNavigator:
         true_bias: what they really are, (N, 6).
         covariance: P, (N, 15, 15).
         index: the epoch where each run stands, (N,); -1 before the first.
+        history: epochs that can be taken back.
+        backtracked: epochs that the last `resolve` took back, (N,).
+        auxiliary: error state of the unaided inertial solution minus that of the filter, (N, 15), to first order; (N,
+            0) if not demanded.
     """
 
-    def __init__(self, model: StrapdownModel, num_runs: int, slices: RunSlices) -> None:
+    def __init__(
+        self, model: StrapdownModel, num_runs: int, slices: RunSlices, demands: Demands = NO_DEMANDS
+    ) -> None:
         """Allocate ``num_runs`` runs; `reset` starts them."""
-        m = model.dimension
+        m, slots = model.dimension, demands.history + 1 if demands.history else 0
         self.model = model
+        self.history = demands.history
         self.attitude = np.zeros((num_runs, 3, 3))
         self.velocity = np.zeros((num_runs, 3))
         self.position = np.zeros((num_runs, 3))
@@ -49,16 +60,33 @@ class StrapdownNavigator:
         self.true_bias = np.zeros((num_runs, 6))
         self.covariance = np.zeros((num_runs, NUM_STATES, NUM_STATES))
         self.index = np.full(num_runs, -1)
+        self.backtracked = np.zeros(num_runs, dtype=np.int64)
+        self.auxiliary = np.zeros((num_runs, NUM_STATES if demands.auxiliary else 0))
         self._instability = np.zeros((num_runs, 6))
         self._fix = np.zeros((num_runs, 6, 3))
         self._gain = np.zeros((num_runs, NUM_STATES, m))
         self._whitened = np.zeros((num_runs, m))
+        self._residual = np.zeros((num_runs, m))
+        self._deviation = np.zeros((num_runs, m))
         self._generators: dict[int, np.random.Generator] = {}
         self._noisy = bool(np.any(model.true_noise) or np.any(model.instability_sigma))
         width = closed_loop.NUM_SAMPLE_NOISES * model.max_samples + closed_loop.NUM_EPOCH_NOISES
-        self._normals = np.zeros((num_runs, EPOCHS_DRAWN, width if self._noisy else 0))
+        blocks = 1 if not slots else -(-slots // EPOCHS_DRAWN) + 2
+        self._normals = np.zeros((num_runs, blocks * EPOCHS_DRAWN, width if self._noisy else 0))
         self._slices = slices
         self._all = np.arange(num_runs)
+        self._ones = np.ones(num_runs)
+        # what a resolved epoch leaves, in the order of the rings
+        self._resolved = (
+            self.attitude,
+            self.velocity,
+            self.position,
+            self.bias,
+            self.true_bias,
+            self._instability,
+            self.covariance,
+        )
+        self._past = tuple(np.zeros((num_runs, slots, *part.shape[1:])) for part in self._resolved)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0.
@@ -70,6 +98,8 @@ class StrapdownNavigator:
         """
         model, error = self.model, initial[:, ERROR]
         self.index[runs] = -1
+        self.backtracked[runs] = 0
+        self.auxiliary[runs] = 0.0
         self.covariance[runs] = model.prior_covariance
         self.position[runs] = displace(np.broadcast_to(model.position, (len(runs), 3)), error[:, 6:9])
         self.velocity[runs] = model.velocity + error[:, 3:6]
@@ -84,13 +114,26 @@ class StrapdownNavigator:
 
     def propagate(self, runs: Runs | None = None) -> None:
         """Carry runs (all by default) to their next epoch by inertial measurements."""
-        self._slices.call(self._propagate_slice, self._all if runs is None else runs, 1)
+        runs = self._all if runs is None else runs
+        self._keep(runs)
+        self._slices.call(self._propagate_slice, runs, 1)
+
+    def _keep(self, runs: Runs) -> None:
+        """Write the resolved states into the history."""
+        if self.history:
+            slot = (self.index[runs] + 1) % (self.history + 1)
+            for ring, part in zip(self._past, self._resolved, strict=True):
+                ring[runs, slot] = part[runs]
 
     def _propagate_slice(self, runs: Runs) -> None:
-        model = self.model
         if self._noisy:
             for run in runs[(self.index[runs] + 1) % EPOCHS_DRAWN == 0].tolist():
-                self._generators[run].standard_normal(out=self._normals[run])
+                begin = (self.index[run] + 1) % self._normals.shape[1]
+                self._generators[run].standard_normal(out=self._normals[run, begin : begin + EPOCHS_DRAWN])
+        self._mechanize(runs, self.auxiliary)
+
+    def _mechanize(self, runs: Runs, auxiliary: Floats) -> None:
+        model = self.model
         closed_loop.propagate(
             runs,
             self.index,
@@ -112,6 +155,7 @@ class StrapdownNavigator:
             model.true_noise,
             model.instability_sigma,
             model.instability_decay,
+            auxiliary,
         )
 
     def innovate(self, deviation: Floats, runs: Runs | None = None) -> Innovation:
@@ -122,9 +166,14 @@ class StrapdownNavigator:
             runs: which, (n,).
         """
         runs = self._all if runs is None else runs
-        model = self.model
-        residual, whitened, nis = np.empty_like(deviation), np.empty_like(deviation), np.empty(len(runs))
-        innovation = np.empty((len(runs), model.dimension, model.dimension))
+        self._deviation[runs] = deviation
+        return self._innovate(runs, self._ones[: len(runs)])
+
+    def _innovate(self, runs: Runs, noise_scale: Floats) -> Innovation:
+        """The innovation of the present fix with R times ``noise_scale`` (n,)."""
+        m, model = self.model.dimension, self.model
+        residual, whitened, nis = np.empty((len(runs), m)), np.empty((len(runs), m)), np.empty(len(runs))
+        innovation = np.empty((len(runs), m, m))
         self._slices.call(
             lambda part: closed_loop.innovate(
                 part,
@@ -137,7 +186,8 @@ class StrapdownNavigator:
                 model.lever_arm,
                 float(model.latency_samples * model.step[0]),
                 model.measurement_covariance,
-                deviation,
+                noise_scale,
+                self._deviation,
                 innovation,
                 self._gain,
                 residual,
@@ -147,11 +197,28 @@ class StrapdownNavigator:
             self._all[: len(runs)],
             GRAIN,
         )
-        self._whitened[runs] = whitened
+        self._whitened[runs], self._residual[runs] = whitened, residual
         return Innovation(residual, innovation, whitened, nis)
 
     def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
-        """Apply the fix where the decision says so, and feed the estimated error back."""
+        """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
+
+        Raises:
+            ValueError: a backtrack without a history.
+        """
+        runs = self._all if runs is None else runs
+        before = self._solution(runs) if self.auxiliary.shape[1] else None
+        again, used = self._take_back(decision, runs), decision.use
+        if decision.noise_scale is not None:
+            again = again | (decision.noise_scale != 1.0)
+        fresh = np.flatnonzero(again & used)
+        if len(fresh):
+            scale = self._ones[: len(fresh)] if decision.noise_scale is None else decision.noise_scale[fresh]
+            self._innovate(runs[fresh], scale)
+        if decision.reset is not None:
+            jumps = used & (decision.reset > 0.0)
+            self._reset_to_fix(runs[jumps], decision.reset[jumps])
+            used = used & ~jumps
         self._slices.call(
             lambda part: closed_loop.resolve(
                 part,
@@ -163,14 +230,76 @@ class StrapdownNavigator:
                 self._gain,
                 self._whitened,
             ),
-            (self._all if runs is None else runs)[decision.use],
+            runs[used],
             GRAIN,
         )
+        if before is not None:
+            self.auxiliary[runs] += _difference(before, self._solution(runs))
+
+    def _take_back(self, decision: Decision, runs: Runs) -> Flags:
+        """Backtrack where it is decided; whether the innovation must be formed anew, (n,)."""
+        self.backtracked[runs] = 0
+        if decision.backtrack is None or not decision.backtrack.any():
+            return np.zeros(len(runs), dtype=bool)
+        if not self.history:
+            raise ValueError("a backtrack is decided, but the navigator keeps no history: demand one when it is built")
+        depth = np.minimum(np.minimum(decision.backtrack, self.history), self.index[runs])
+        self.backtracked[runs] = depth
+        self._slices.call(self._backtrack_slice, runs[depth > 0], 1)
+        return depth > 0
+
+    def _backtrack_slice(self, runs: Runs) -> None:
+        """Restore the state after epoch k - n - 1 and carry it to epoch k; runs join in when their depth is reached."""
+        depth = self.backtracked[runs]
+        for left in range(int(depth.max(initial=0)), -1, -1):
+            joining = runs[depth == left]
+            if left and len(joining):
+                slot = (self.index[joining] - left) % (self.history + 1)
+                for ring, part in zip(self._past, self._resolved, strict=True):
+                    part[joining] = ring[joining, slot]
+                self.index[joining] -= left + 1
+            active = runs[depth >= left]
+            if left < depth.max():
+                self._keep(active[depth[depth >= left] > left])
+            self._mechanize(active, self.auxiliary[:, :0])
+
+    def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
+        """Position and, where the receiver gives it, velocity jump to the fix; their correlations are forgotten."""
+        if len(runs):
+            closed_loop.reset(
+                runs,
+                variance,
+                self.index,
+                self.velocity,
+                self.position,
+                self.covariance,
+                self.model.measurement_covariance,
+                self._residual[runs],
+            )
+
+    def _solution(self, runs: Runs) -> tuple[Floats, Floats, Floats, Floats]:
+        return self.attitude[runs], self.velocity[runs], self.position[runs], self.bias[runs]
 
     @property
     def error(self) -> Floats:
         """Estimate minus truth, (N, 3), m ENU."""
         return position_difference(self.position, self.model.true_position[self.index])
+
+    @property
+    def velocity_error(self) -> Floats:
+        """Estimate minus truth, (N, 3), m/s ENU."""
+        return self.velocity - self.model.true_velocity[self.index]
+
+    @property
+    def auxiliary_offset(self) -> Floats:
+        """Position of the unaided inertial solution minus that of the filter, (N, 3), m ENU.
+
+        Raises:
+            RuntimeError: nobody demanded an unaided solution.
+        """
+        if not self.auxiliary.shape[1]:
+            raise RuntimeError("this navigator has no unaided inertial solution: demand it when it is built")
+        return self.auxiliary[:, 6:9].copy()
 
     @property
     def position_covariance(self) -> Floats:
@@ -181,3 +310,33 @@ class StrapdownNavigator:
     def estimated_bias(self) -> Floats:
         """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
         return self.bias.copy()
+
+    def recomputed_error(self, epochs: int) -> Floats:
+        """Errors after each of the last epochs as backtracking has rewritten them, (N, epochs, 3), m ENU, oldest first.
+
+        As `OwnCovarianceNavigator.recomputed_error`.
+
+        Raises:
+            ValueError: more epochs than the history holds.
+        """
+        if not 0 <= epochs <= self.history:
+            raise ValueError(f"epochs must be from 0 to the history of {self.history}, got {epochs}")
+        order = self.index[:, None] - epochs + np.arange(epochs)
+        position = self._past[2][self._all[:, None], (order + 1) % (self.history + 1)]
+        truth = self.model.true_position[np.maximum(order, 0)]
+        error = position_difference(position.reshape(-1, 3), truth.reshape(-1, 3)).reshape(*order.shape, 3)
+        return np.where(order[:, :, None] >= 0, error, 0.0)
+
+
+def _difference(one: tuple[Floats, ...], other: tuple[Floats, ...]) -> Floats:
+    """Error state of one solution minus that of another, (n, 15), to first order.
+
+    With C₁ = (I - [φ₁ x]) C and likewise C₂, C₁ C₂' = I - [(φ₁ - φ₂) x]; a bias error is true minus estimated.
+    """
+    turn = np.einsum("nij,nkj->nik", one[0], other[0])
+    attitude = 0.5 * np.stack(
+        [turn[:, 1, 2] - turn[:, 2, 1], turn[:, 2, 0] - turn[:, 0, 2], turn[:, 0, 1] - turn[:, 1, 0]], axis=1
+    )
+    return np.concatenate(
+        [attitude, one[1] - other[1], position_difference(one[2], other[2]), other[3] - one[3]], axis=1
+    )

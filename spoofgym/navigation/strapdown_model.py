@@ -34,6 +34,7 @@ class StrapdownModel:
             rad, height m.
         fix_velocity: the same, ENU, (K+1, 3), m/s.
         true_position: against which the error is formed, (K+1, 3).
+        true_velocity: the same, ENU, (K+1, 3), m/s.
         lever_arm: of the antenna, body R, F, U, (3,), m.
         latency_samples: inertial samples between the fix and its epoch.
         measurement_covariance: the filter's R, (K+1, m, m).
@@ -55,6 +56,7 @@ class StrapdownModel:
     fix_position: Floats
     fix_velocity: Floats
     true_position: Floats
+    true_velocity: Floats
     lever_arm: Floats
     latency_samples: int
     measurement_covariance: Floats
@@ -119,6 +121,7 @@ def strapdown_model(
         fix_position=displace(trajectory.position[taken], arm),
         fix_velocity=trajectory.velocity[taken],
         true_position=trajectory.position[ends],
+        true_velocity=trajectory.velocity[ends],
         lever_arm=np.array(receiver.lever_arm, dtype=float),
         latency_samples=round(receiver.latency * trajectory.rate),
         measurement_covariance=np.broadcast_to(

@@ -5,17 +5,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from spoofgym.arrays import Flags, Runs, take_runs
-from spoofgym.navigation.interface import Decision, Epoch
+from spoofgym.navigation.interface import Decision, Demands, Epoch
 
 
 class Response(ABC):
     """What follows an alarm, in N runs.
 
     Attributes:
-        excludes: whether it can ever leave a fix out: each run then needs a covariance of its own.
+        demands: what it asks of the navigator: by default that a fix can be left out; a response that backtracks
+            demands the history it needs.
     """
 
-    excludes: bool = True
+    demands: Demands = Demands(excludes=True)
 
     @property
     @abstractmethod

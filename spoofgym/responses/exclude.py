@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.navigation.interface import Decision, Epoch
+from spoofgym.navigation.interface import Decision, Demands, Epoch
 from spoofgym.responses.base import Response
 
 
 class AlwaysUse(Response):
     """Every fix is used, whatever the detectors say."""
 
-    excludes = False
+    demands = Demands()
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
-from spoofgym.navigation.interface import Decision, Timeline
+from spoofgym.navigation.interface import Decision, Demands, Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose import StrapdownNavigator
 from spoofgym.navigation.strapdown_model import StrapdownModel
@@ -216,6 +216,7 @@ class RecordedScenario(Scenario):
             fix_position=position,
             fix_velocity=velocity,
             true_position=position if self._truth is None else self._truth[0],
+            true_velocity=velocity if self._truth is None else self._truth[1],
             lever_arm=np.zeros(3),
             latency_samples=0,
             measurement_covariance=np.square(sigma)[:, :, None] * np.eye(self.dimension),
@@ -270,6 +271,11 @@ class RecordedScenario(Scenario):
         """Of all epochs after the alignment, (E, 3): the reference's, else the clean run's."""
         return self.clean.position[1:] if self._truth is None else self._truth[0]
 
+    @property
+    def true_velocity(self) -> Floats:
+        """Of all epochs after the alignment, (E, 3), ENU, m/s: the reference's, else the clean run's."""
+        return self.clean.velocity[1:] if self._truth is None else self._truth[1]
+
     def _first(self, burn_in: int) -> int:
         if burn_in > self.first:
             raise ValueError(
@@ -282,10 +288,9 @@ class RecordedScenario(Scenario):
         """Log time of the epochs -burn_in..K, s."""
         return self.epoch_time[self._first(burn_in) : self.last + 1]
 
-    def velocity(self) -> Floats:
-        """The velocity at epochs 0..K, (K+1, 3), ENU, m/s: the reference's, else the clean run's."""
-        velocity = self.clean.velocity[1:] if self._truth is None else self._truth[1]
-        return velocity[self.first : self.last + 1]
+    def velocity(self, burn_in: int = 0) -> Floats:
+        """The velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s: the reference's, else the clean run's."""
+        return self.true_velocity[self._first(burn_in) : self.last + 1]
 
     def track(self) -> Floats:
         """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
@@ -303,7 +308,7 @@ class RecordedScenario(Scenario):
         )
 
     def navigator(
-        self, fidelity: str, excludes: bool, burn_in: int, num_runs: int, slices: RunSlices
+        self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
     ) -> StrapdownNavigator:
         """A navigator that starts from the clean run's filter before epoch -burn_in; arguments as in `Scenario`."""
         self.check_fidelity(fidelity)
@@ -315,13 +320,14 @@ class RecordedScenario(Scenario):
             fix_position=whole.fix_position[first:stop],
             fix_velocity=whole.fix_velocity[first:stop],
             true_position=self.true_position[first:stop],
+            true_velocity=self.true_velocity[first:stop],
             measurement_covariance=whole.measurement_covariance[first:stop],
             attitude=clean.attitude[first],
             velocity=clean.velocity[first],
             position=clean.position[first],
             prior_covariance=clean.covariance[first],
         )
-        return StrapdownNavigator(model, num_runs, slices)
+        return StrapdownNavigator(model, num_runs, slices, demands)
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
         """No error but the biases': the samples carry the real ones, the filter its estimates, (n, 30)."""

@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 
 from spoofgym.attacks.profiles import Ramp
 from spoofgym.navigation.error_model import navigation_dynamics, transition_matrix
-from spoofgym.navigation.interface import Clock, Decision
+from spoofgym.navigation.interface import Clock, Decision, Demands
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.sensors.imu import grade
@@ -89,7 +89,8 @@ def play(scenario, attack, excludes=False, out=range(0)):
         Position error after each epoch (2, K+1, N, 3), whitened innovations, nis, and the biases estimated at the end.
     """
     slices = RunSlices(1)
-    pair = [scenario.navigator(fidelity, excludes, 0, RUNS, slices) for fidelity in ("strapdown", "linear")]
+    demands = Demands(excludes=excludes)
+    pair = [scenario.navigator(fidelity, demands, 0, RUNS, slices) for fidelity in ("strapdown", "linear")]
     runs, streams = np.arange(RUNS), RunStreams.from_seed(SEED, RUNS)
     initial = scenario.draw_initial(runs, 0, streams)
     noise = scenario.draw_receiver_noise(runs, initial, 0, streams)
@@ -156,7 +157,7 @@ def test_the_noise_is_what_makes_them_agree(ramp):
     runs, streams = np.arange(RUNS), RunStreams.from_seed(SEED, RUNS)
     initial = scenario.draw_initial(runs, 0, streams)
     noise = scenario.draw_receiver_noise(runs, initial, 0, streams)
-    own = scenario.navigator("linear", False, 0, RUNS, RunSlices(1))
+    own = scenario.navigator("linear", Demands(), 0, RUNS, RunSlices(1))
     own.reset(runs, initial, streams)
     for k in range(60):
         own.propagate()

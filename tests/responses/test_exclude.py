@@ -48,7 +48,7 @@ def test_a_run_does_not_depend_on_the_others(name):
 def test_excludes_tells_the_truth(name):
     response = make_response(name)
     assert response.name == name
-    assert response.excludes == (not decisions(name, ALARMS).all())
+    assert response.demands.excludes == (not decisions(name, ALARMS).all())
 
 
 def test_make_response_takes_objects():
