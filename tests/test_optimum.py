@@ -55,8 +55,8 @@ def synthetic_model(num_epochs: int, dimension: int = 3, interval: float = 1.0) 
         covariance = transition @ covariance @ transition.T + noise
         priors.append(covariance)
         factors.append(np.linalg.cholesky(full @ covariance @ full.T + np.diag(sigma**2)))
-        gains.append(np.linalg.solve(factors[-1], full @ covariance).T)
-        covariance = covariance - gains[-1] @ gains[-1].T
+        gains.append(np.linalg.solve(factors[-1], full @ covariance))
+        covariance = covariance - gains[-1].T @ gains[-1]
 
     def every(matrix: np.ndarray) -> np.ndarray:
         return np.repeat(matrix[None], num_epochs + 1, axis=0)
@@ -105,7 +105,7 @@ def test_expected_play_agrees_with_the_simulated_filter(dimension):
 
 def simulate(model, offsets, threshold, runs, generator):
     """The stochastic recursion, step by step: (survived (runs,), horizontal error after the last epoch (runs, 2))."""
-    posterior = model.covariance[0] - model.whitened_gain[0] @ model.whitened_gain[0].T
+    posterior = model.covariance[0] - model.whitened_gain[0].T @ model.whitened_gain[0]
     error = generator.multivariate_normal(np.zeros(15), posterior, runs, method="eigh")
     survived = np.ones(runs, dtype=bool)
     previous = np.zeros(3)
@@ -119,7 +119,7 @@ def simulate(model, offsets, threshold, runs, generator):
         residual = error[:, :9] @ model.observation[k].T - spoofing - receiver
         whitened = np.linalg.solve(model.innovation_factor[k], residual.T).T
         survived &= (whitened**2).sum(axis=1) <= threshold
-        error = error - whitened @ model.whitened_gain[k].T
+        error = error - whitened @ model.whitened_gain[k]
     return survived, error[:, 6:8]
 
 

@@ -162,7 +162,7 @@ def innovate(
     """
     m = residual.shape[1]
     observation, arm = np.zeros((m, NUM_NAVIGATION)), np.empty(3)
-    cross, factor = np.empty((NUM_STATES, m)), np.empty((m, m))
+    cross, factor = np.empty((m, NUM_STATES)), np.empty((m, m))
     for place in places:
         run = runs[place]
         k = index[run]

@@ -8,7 +8,8 @@ The update is written in whitened form: with S = L L', U = P H' L⁻ᵀ and w = 
 
     K z = U w,        P⁺ = P - U U',        NIS = w' w,
 
-which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. Source: Bar-Shalom, Li and
+which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. U is stored by columns, as U'
+(m, 15), so that every inner loop runs along a row. Source: Bar-Shalom, Li and
 Kirubarajan 2001, ch. 5, rearranged.
 """
 
@@ -98,27 +99,29 @@ def predict_covariance(transition: Floats, process_noise: Floats, covariance: Fl
 def innovation_covariance(
     covariance: Floats, observation: Floats, noise_covariance: Floats, cross: Floats, innovation: Floats
 ) -> None:
-    """PH' and S = H P H' + R.
+    """HP and S = H P H' + R.
 
     Args:
         covariance: P, (15, 15).
-        observation: H, (m, 9).
+        observation: H, (m, 9); mostly zeros, which cost nothing.
         noise_covariance: R, (m, m).
-        cross: PH', (15, m), overwritten.
+        cross: HP, (m, 15), overwritten.
         innovation: S, (m, m), overwritten.
     """
     m = observation.shape[0]
-    for i in range(FULL):
-        for a in range(m):
-            total = 0.0
-            for k in range(N):
-                total += covariance[i, k] * observation[a, k]
-            cross[i, a] = total
+    for a in range(m):
+        for j in range(FULL):
+            cross[a, j] = 0.0
+        for k in range(N):
+            factor = observation[a, k]
+            if factor != 0.0:
+                for j in range(FULL):
+                    cross[a, j] += factor * covariance[k, j]
     for a in range(m):
         for b in range(m):
             total = noise_covariance[a, b]
             for k in range(N):
-                total += observation[a, k] * cross[k, b]
+                total += observation[a, k] * cross[b, k]
             innovation[a, b] = total
 
 
@@ -158,20 +161,23 @@ def cholesky(matrix: Floats, factor: Floats) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
-    """U = P H' L⁻ᵀ.
+    """U' = L⁻¹ H P.
 
     Args:
-        cross: PH', (15, m).
+        cross: HP, (m, 15).
         factor: L, (m, m).
-        gain: U, (15, m), overwritten.
+        gain: U', (m, 15), overwritten.
     """
-    m = factor.shape[0]
-    for i in range(FULL):
-        for a in range(m):
-            total = cross[i, a]
-            for b in range(a):
-                total -= factor[a, b] * gain[i, b]
-            gain[i, a] = total / factor[a, a]
+    for a in range(factor.shape[0]):
+        for i in range(FULL):
+            gain[a, i] = cross[a, i]
+        for b in range(a):
+            share = factor[a, b]
+            for i in range(FULL):
+                gain[a, i] -= share * gain[b, i]
+        scale = 1.0 / factor[a, a]
+        for i in range(FULL):
+            gain[a, i] *= scale
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -195,21 +201,23 @@ def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def update_covariance(gain: Floats, covariance: Floats) -> None:
-    """P <- P - U U'; gain U (15, m), covariance (15, 15) in place."""
-    m = gain.shape[1]
+    """P <- P - U U'; gain U' (m, 15), covariance (15, 15) in place.
+
+    Whole rows are faster than the lower triangle alone; it is mirrored, since the last bits of both halves may differ.
+    """
     for i in range(FULL):
-        for j in range(i + 1):
-            total = covariance[i, j]
-            for a in range(m):
-                total -= gain[i, a] * gain[j, a]
-            covariance[i, j] = total
-            covariance[j, i] = total
+        for a in range(gain.shape[0]):
+            factor = gain[a, i]
+            for j in range(FULL):
+                covariance[i, j] -= factor * gain[a, j]
+        for j in range(i):
+            covariance[j, i] = covariance[i, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def correct_error(gain: Floats, whitened: Floats, error: Floats) -> None:
-    """x <- x - K z = x - U w; gain U (15, m), whitened w (m,), error x (15,) in place."""
-    for a in range(gain.shape[1]):
+    """x <- x - K z = x - U w; gain U' (m, 15), whitened w (m,), error x (15,) in place."""
+    for a in range(gain.shape[0]):
         factor = whitened[a]
         for i in range(FULL):
-            error[i] -= gain[i, a] * factor
+            error[i] -= gain[a, i] * factor

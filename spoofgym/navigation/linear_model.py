@@ -55,7 +55,7 @@ class LinearModel:
         covariance: the filter's P at epoch k before the fix, every fix used, (K+1, 15, 15).
         innovation_covariance: S, (K+1, m, m).
         innovation_factor: lower L with S = L L', (K+1, m, m).
-        whitened_gain: U = P H' L⁻ᵀ, so that the gain is U L⁻¹, (K+1, 15, m).
+        whitened_gain: U' = L⁻¹ H P, so that the gain is U L⁻¹, (K+1, m, 15).
     """
 
     time: Floats
@@ -198,14 +198,14 @@ def filter_gains(
     """The filter's covariance recursion with every fix used.
 
     Returns:
-        P before the fix (E, 15, 15), L (E, m, m), U (E, 15, m), S (E, m, m).
+        P before the fix (E, 15, 15), L (E, m, m), U' (E, m, 15), S (E, m, m).
     """
     epochs, m, _ = dynamics.observation.shape
     prior = np.empty((epochs, NUM_STATES, NUM_STATES))
     factor, innovation = np.empty((epochs, m, m)), np.empty((epochs, m, m))
-    gain = np.empty((epochs, NUM_STATES, m))
+    gain = np.empty((epochs, m, NUM_STATES))
     covariance = prior_covariance.copy()
-    cross, work = np.empty((NUM_STATES, m)), np.empty((NUM_NAVIGATION, NUM_STATES))
+    cross, work = np.empty((m, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
     for k in range(epochs):
         kalman.predict_covariance(dynamics.transition[k], dynamics.process_noise[k], covariance, work)
         prior[k] = covariance

@@ -64,7 +64,7 @@ class StrapdownNavigator:
         self.auxiliary = np.zeros((num_runs, NUM_STATES if demands.auxiliary else 0))
         self._instability = np.zeros((num_runs, 6))
         self._fix = np.zeros((num_runs, 6, 3))
-        self._gain = np.zeros((num_runs, NUM_STATES, m))
+        self._gain = np.zeros((num_runs, m, NUM_STATES))
         self._whitened = np.zeros((num_runs, m))
         self._residual = np.zeros((num_runs, m))
         self._deviation = np.zeros((num_runs, m))

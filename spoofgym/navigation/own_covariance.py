@@ -52,7 +52,7 @@ class OwnCovarianceNavigator(LinearNavigator):
         m, slots = model.dimension, demands.history + 1 if demands.history else 0
         self.covariance = np.zeros((num_runs, NUM_STATES, NUM_STATES))
         self.history = demands.history
-        self._gain = np.zeros((num_runs, NUM_STATES, m))
+        self._gain = np.zeros((num_runs, m, NUM_STATES))
         self._deviation = np.zeros((num_runs, m))
         self._past_state = np.zeros((num_runs, slots, NUM_STATES))
         self._past_covariance = np.zeros((num_runs, slots, NUM_PACKED))
@@ -318,7 +318,7 @@ def _innovate_own(
 ) -> None:
     """Innovation with each run's own S, and its whitened gain; outputs but the gain stand at the places of the runs."""
     m = observation.shape[1]
-    cross, factor = np.empty((NUM_STATES, m)), np.empty((m, m))
+    cross, factor = np.empty((m, NUM_STATES)), np.empty((m, m))
     for place in places:
         run = runs[place]
         k = index[run]

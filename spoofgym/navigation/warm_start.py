@@ -91,10 +91,10 @@ def warm_up(
         observed[:, :NUM_NAVIGATION] = dynamics.observation[k]
         joint = advance @ joint @ advance.T + noise
         update = np.eye(NUM_JOINT)
-        kalman_gain = gain[k] @ np.linalg.inv(factor[k])
+        kalman_gain = gain[k].T @ np.linalg.inv(factor[k])
         update[ERROR] -= kalman_gain @ observed
         joint = update @ joint @ update.T
         joint[ERROR, ERROR] += (kalman_gain * white) @ kalman_gain.T
         joint = 0.5 * (joint + joint.T)
-    covariance = prior[-1] - gain[-1] @ gain[-1].T
+    covariance = prior[-1] - gain[-1].T @ gain[-1]
     return WarmStart(covariance, joint, semidefinite_factor(joint))

@@ -130,7 +130,7 @@ def _recursion(
         columns: the first nine rows of Φ by columns, epochs 0..K, (K+1, 15, 9).
         observation: H, (K+1, m, 9).
         innovation_factor: L, (K+1, m, m).
-        whitened_gain: U, (K+1, 15, m).
+        whitened_gain: U', (K+1, m, 15).
         deviations: what the spoofer adds to the fixes, (K, m).
         whitened: filled with u_k, (K, m).
         final_error: filled with the horizontal e_K, (2,), m.

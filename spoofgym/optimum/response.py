@@ -48,7 +48,7 @@ def error_response(model: LinearModel, num_epochs: int) -> Floats:
     rows[:, HORIZONTAL] = np.eye(2)
     response = np.empty((2, num_epochs, model.dimension))
     for k in range(num_epochs, 0, -1):
-        response[:, k - 1] = -rows @ model.whitened_gain[k]
+        response[:, k - 1] = -rows @ model.whitened_gain[k].T
         rows = rows @ model.transition[k]
     return response
 
@@ -72,7 +72,7 @@ def offsets_of(model: LinearModel, whitened: Floats) -> Floats:
     for k, mean in enumerate(whitened, start=1):
         error = model.transition[k] @ error
         offsets[k - 1] = model.observation[k] @ error[:9] - model.innovation_factor[k] @ mean
-        error = error - model.whitened_gain[k] @ mean
+        error = error - mean @ model.whitened_gain[k]
     return offsets
 
 
@@ -99,7 +99,7 @@ def increment_maps(model: LinearModel) -> tuple[Floats, Floats]:
         factor = model.innovation_factor[k]
         for a in range(dimension):  # forward substitution: a LAPACK call for 3 rows costs more than it computes
             whitened[k - 1, a] = (residual[a] - factor[a, :a] @ whitened[k - 1, :a]) / factor[a, a]
-        error -= model.whitened_gain[k] @ whitened[k - 1]
+        error -= model.whitened_gain[k].T @ whitened[k - 1]
     return whitened.reshape(num_epochs * dimension, num_epochs * 3), error[HORIZONTAL]
 
 

@@ -88,7 +88,7 @@ def play(scenario, fidelity, runs, seed):
 def posterior(scenario):
     """The filter's P after the last fix."""
     model = scenario.linear_model()
-    return model.covariance[-1] - model.whitened_gain[-1] @ model.whitened_gain[-1].T
+    return model.covariance[-1] - model.whitened_gain[-1].T @ model.whitened_gain[-1]
 
 
 @pytest.fixture(scope="module", params=[(name, fidelity) for name in SCENARIOS for fidelity in RUNS], ids="-".join)

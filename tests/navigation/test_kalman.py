@@ -37,8 +37,8 @@ def problem(seed, m):
 def whitened(covariance, observation, noise, residual):
     """S, L, U, w and NIS by the kernels."""
     m = len(residual)
-    cross, innovation, factor = np.empty((15, m)), np.empty((m, m)), np.full((m, m), np.nan)
-    gain, white = np.empty((15, m)), np.empty(m)
+    cross, innovation, factor = np.empty((m, 15)), np.empty((m, m)), np.full((m, m), np.nan)
+    gain, white = np.empty((m, 15)), np.empty(m)
     kalman.innovation_covariance(covariance, np.ascontiguousarray(observation[:, :9]), noise, cross, innovation)
     kalman.cholesky(innovation, factor)
     kalman.whitened_gain(cross, factor, gain)
@@ -71,7 +71,7 @@ def test_innovation_is_whitened_by_the_lower_factor(seed, m):
     np.testing.assert_allclose(white, solve_triangular(factor, residual, lower=True), rtol=1e-9)
     assert nis == pytest.approx(residual @ np.linalg.solve(expected, residual), rel=1e-6)
     dense = covariance @ observation.T @ np.linalg.inv(expected)
-    np.testing.assert_allclose(gain @ np.linalg.inv(factor), dense, rtol=1e-5, atol=1e-8 * np.abs(dense).max())
+    np.testing.assert_allclose(gain.T @ np.linalg.inv(factor), dense, rtol=1e-5, atol=1e-8 * np.abs(dense).max())
 
 
 @pytest.mark.parametrize(("seed", "m"), CASES)

@@ -94,7 +94,7 @@ def test_warm_filter_has_the_prototypes_uncertainty(flight):
     accelerometer 8.1 7.7 1.07 µg, within 10 %: our manoeuvres have other shapes.
     """
     model = flight.linear_model()
-    gain = model.whitened_gain[-1]
+    gain = model.whitened_gain[-1].T
     sigma = np.sqrt(np.diag(model.covariance[-1] - gain @ gain.T))
     unit = np.repeat([ARCSECOND, 1.0, 1.0, DEGREE_PER_HOUR, MICRO_G], 3)
     navigation = [4.1, 4.2, 18.1, 0.0138, 0.0136, 0.0042, 0.68, 0.67, 0.62]
@@ -111,7 +111,7 @@ def test_gains_are_those_of_the_covariance(flight):
         np.testing.assert_allclose(model.innovation_factor[k] @ model.innovation_factor[k].T, innovation, rtol=1e-10)
         gain = model.covariance[k] @ observation.T @ np.linalg.inv(innovation)
         np.testing.assert_allclose(
-            model.whitened_gain[k] @ np.linalg.inv(model.innovation_factor[k]), gain, rtol=1e-8, atol=1e-15
+            model.whitened_gain[k].T @ np.linalg.inv(model.innovation_factor[k]), gain, rtol=1e-8, atol=1e-15
         )
 
 
