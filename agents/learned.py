@@ -1,16 +1,17 @@
-"""A learned spoofer: a small network in NumPy, so that a policy can be used without torch and without a pickle."""
+"""Learned players: small networks in NumPy, so that a policy can be used without torch and without a pickle."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import Self
 
-from spoofgym.envs.config import SpooferConfig, configure
+from spoofgym.envs.config import DefenderConfig, SpooferConfig, configure
 from spoofgym.envs.observation import Field
 
 POLICY_FILE = "policy.npz"
@@ -18,29 +19,31 @@ CONFIG_FILE = "config.json"
 
 
 @dataclass(frozen=True)
-class LearnedSpoofer:
-    """The mean action of a tanh network.
+class LearnedPolicy:
+    """A tanh network and what it was trained on.
 
     Attributes:
         name: its run folder's name.
-        config: the environment it was trained on.
+        config: the environment it was trained on, a ``config_type``.
         layout: the entries of the observation it was trained on, by name.
         weights: of each layer, (outputs, inputs).
         biases: of each layer, (outputs,).
     """
 
+    config_type: ClassVar[type]
+
     name: str
-    config: SpooferConfig
+    config: Any
     layout: tuple[str, ...]
     weights: tuple[NDArray[np.float32], ...]
     biases: tuple[NDArray[np.float32], ...]
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Actions in [-1, 1] for observations (N, D), (N, 3)."""
+    def outputs(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the last layer gives for observations (N, D)."""
         hidden = observation
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             hidden = np.tanh(hidden @ weight.T + bias)
-        return np.clip(hidden @ self.weights[-1].T + self.biases[-1], -1.0, 1.0)
+        return hidden @ self.weights[-1].T + self.biases[-1]
 
     def check_layout(self, fields: tuple[Field, ...]) -> None:
         """Refuse an environment whose observation has other entries.
@@ -69,7 +72,7 @@ class LearnedSpoofer:
         temporary.replace(folder / POLICY_FILE)
 
     @classmethod
-    def load(cls, folder: Path) -> LearnedSpoofer:
+    def load(cls, folder: Path) -> Self:
         """Read a run folder.
 
         Raises:
@@ -80,7 +83,7 @@ class LearnedSpoofer:
             if not (folder / name).is_file():
                 raise FileNotFoundError(f"{folder} is no run folder: it has no {name}")
         try:
-            config = configure(SpooferConfig, json.loads((folder / CONFIG_FILE).read_text())["environment"])
+            config: Any = configure(cls.config_type, json.loads((folder / CONFIG_FILE).read_text())["environment"])
             with np.load(folder / POLICY_FILE, allow_pickle=False) as arrays:
                 layers = sum(key.startswith("weight_") for key in arrays)
                 return cls(
@@ -92,3 +95,24 @@ class LearnedSpoofer:
                 )
         except (KeyError, TypeError, json.JSONDecodeError, OSError) as error:
             raise ValueError(f"{folder}: damaged run folder: {error}") from error
+
+
+class LearnedSpoofer(LearnedPolicy):
+    """A spoofer that plays the mean action of its network."""
+
+    config_type = SpooferConfig
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions in [-1, 1] for observations (N, D), (N, 3)."""
+        return np.clip(self.outputs(observation), -1.0, 1.0)
+
+
+class LearnedDefender(LearnedPolicy):
+    """A defender that plays the likeliest action: two outputs of its network are of use and exclude, D of the depth."""
+
+    config_type = DefenderConfig
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions for observations (N, D), (N, 2)."""
+        outputs = self.outputs(observation)
+        return np.stack([outputs[:, :2].argmax(axis=1), outputs[:, 2:].argmax(axis=1)], axis=1)

@@ -10,3 +10,10 @@ if "spoofgym/Spoofer-v0" not in registry:
         entry_point="spoofgym.envs.spoofer:SpooferEnv",
         vector_entry_point="spoofgym.envs.vector:SpooferVectorEnv",
     )
+
+if "spoofgym/Defender-v0" not in registry:
+    register(
+        id="spoofgym/Defender-v0",
+        entry_point="spoofgym.envs.defender:DefenderEnv",
+        vector_entry_point="spoofgym.envs.vector:DefenderVectorEnv",
+    )

@@ -11,26 +11,31 @@ from __future__ import annotations
 import argparse
 import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
-from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
+from spoofgym import calibration_cache, validation
+from spoofgym.arrays import Floats
+from spoofgym.calibration_cache import Setting
+from spoofgym.clean_statistics import (
+    CleanStatistics,
+    JointStatistics,
+    joint_statistics,
+    white_statistics,
+)
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_ARL0, DEFAULT_WINDOW, Windowed
-from spoofgym.navigation.interface import Epoch, Innovation
+from spoofgym.first_alarms import FirstAlarms
 from spoofgym.scenario import Scenario
-from spoofgym.simulation import Simulation
 
 RUNS = 5000
 FIRST_ALARMS = 200
+SIMULATED_FIRST_ALARMS = 100
+SLOPE_RUNS = 1000
 CONFIDENCE = 0.95
-
-CleanStatistics = Callable[[Detector, int, np.random.Generator], tuple[Floats, Floats]]
-"""(detector, runs, randomness) -> its statistic in the burn-in (n, B) and in the clean epochs after it (n, K)."""
 
 
 @dataclass(frozen=True)
@@ -60,189 +65,81 @@ def poisson_interval(events: int, exposure: int) -> tuple[float, float]:
     return exposure / most, exposure / least if least else math.inf
 
 
-# --- where clean statistics come from ---------------------------------------------------------------------------------
-
-
-def white_statistics(factor: Floats, num_epochs: int) -> CleanStatistics:
-    """Statistics on the innovations of a matched filter, which are white: residual = L n.
-
-    Args:
-        factor: L, lower, (m, m).
-        num_epochs: K, of a run.
-    """
-    m = len(factor)
-
-    def statistics(detector: Detector, runs: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        detector.bind(runs, m)
-        covariance = np.broadcast_to(factor @ factor.T, (runs, m, m))
-        kept = np.empty((runs, detector.memory + num_epochs))
-        for k in range(kept.shape[1]):
-            whitened = rng.standard_normal((runs, m))
-            residual = np.einsum("nj,ij->ni", whitened, factor)
-            nis = np.einsum("nj,nj->n", whitened, whitened)
-            index = np.full(runs, k - detector.memory)
-            epoch = Epoch(index, index.astype(np.float64), Innovation(residual, covariance, whitened, nis))
-            kept[:, k] = detector.update(epoch)
-        return kept[:, : detector.memory], kept[:, detector.memory :]
-
-    return statistics
-
-
-class _BurnIn(Detector):
-    """A detector that never alarms, and keeps the highest statistic of each run before epoch 0 in ``peak``."""
-
-    threshold = math.inf
-
-    def __init__(self, detector: Detector) -> None:
-        self._detector = detector
-        self.memory = detector.memory
-
-    @property
-    def name(self) -> str:
-        """That of the detector."""
-        return self._detector.name
-
-    def bind(self, num_runs: int, dimension: int) -> None:
-        """Allocate a memory of its own for the detector."""
-        self._detector = copy.copy(self._detector)
-        self._detector.bind(num_runs, dimension)
-        self.peak = np.full(num_runs, -math.inf)
-
-    def take(self, runs: Runs, other: Detector) -> None:
-        """Copy the peaks and what the detector remembers."""
-        assert isinstance(other, _BurnIn)
-        self.peak[runs] = other.peak
-        self._detector.take(runs, other._detector)
-
-    def update(self, epoch: Epoch) -> Floats:
-        """The detector's statistic, (N,)."""
-        statistic = self._detector.update(epoch)
-        self.peak = np.where(epoch.index < 0, np.maximum(self.peak, statistic), self.peak)
-        return statistic
-
-
-def simulated_statistics(scenario: Scenario, fidelity: str, threads: int = 1) -> CleanStatistics:
-    """Statistics on clean runs of a scenario: the highest of the burn-in, and all from the clean epoch 0 on."""
-
-    def statistics(detector: Detector, runs: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        watch = _BurnIn(detector)
-        seed = int(rng.integers(2**31))
-        simulation = Simulation(scenario, None, [watch], None, runs, seed, fidelity=fidelity, threads=threads)
-        kept = np.empty((runs, scenario.timeline.num_epochs + 1))
-        kept[:, 0] = simulation.reset().statistics[watch.name]
-        for k in range(1, kept.shape[1]):
-            simulation.resolve()
-            kept[:, k] = simulation.observe().statistics[watch.name]
-        return watch.peak[:, None], kept
-
-    return statistics
-
-
 # --- thresholds and ARL₀ ----------------------------------------------------------------------------------------------
 
 
-class FirstAlarms:
-    """First alarms and epochs at risk of clean runs, for every threshold at once.
-
-    A statistic that exceeds all earlier ones of its run is a record. With a threshold from the record before it up to
-    this one the run's first alarm is at this epoch: the records tell what any threshold would have done.
+class _Search:
+    """The search for the threshold of one detector, which goes on until enough first alarms decide.
 
     Attributes:
-        floor: thresholds below are no longer told apart.
+        detector: whose statistic.
+        result: None until they do.
     """
 
-    def __init__(self) -> None:
-        self.floor = -math.inf
-        self._runs = self._length = 0
-        self._burn_in = np.empty(0)
-        self._before = np.empty(0)
-        self._record = np.empty(0)
-        self._epoch: Runs = np.empty(0, dtype=np.int64)
+    def __init__(self, detector: Detector, arl0: float, first_alarms: int) -> None:
+        self.detector = detector
+        self.result: Calibration | None = None
+        self._arl0 = validation.above("calibration", "arl0", arl0, 1.0)
+        self._first_alarms = validation.whole("calibration", "first_alarms", first_alarms, 10)
+        self._counted = FirstAlarms()
 
     def add(self, burn_in: Floats, statistics: Floats) -> None:
-        """Count new runs.
+        """Count new runs; arguments as in `FirstAlarms.add`."""
+        if not statistics.any():
+            raise ValueError(f"detector {self.detector.name!r}: the statistic is 0 in all clean runs")
+        counted = self._counted
+        counted.add(burn_in, statistics)
+        threshold = counted.threshold(self._arl0)
+        alarms, at_risk = counted.at(threshold)
+        if alarms >= self._first_alarms:
+            self.result = _calibration(threshold, alarms, at_risk)
+            return
+        floor = counted.threshold(self._arl0 / 8.0)
+        if counted.at(floor)[0] >= self._first_alarms:
+            counted.forget_below(floor)
 
-        Args:
-            burn_in: statistic in the burn-in, (n, B).
-            statistics: in the K epochs at risk, (n, K), of the same K at every call.
 
-        Raises:
-            ValueError: there is no epoch, another K than before, or a statistic that is not a number.
-        """
-        runs, length = statistics.shape
-        if length == 0 or (self._runs and length != self._length):
-            raise ValueError(f"clean runs have {length} epochs at risk, those before them {self._length}")
-        if np.isnan(statistics).any() or np.isnan(burn_in).any():
-            raise ValueError("a statistic of a clean run is not a number")
-        highest = np.empty((runs, length + 1))
-        highest[:, 0] = burn_in.max(axis=1, initial=self.floor)
-        np.maximum.accumulate(statistics, axis=1, out=highest[:, 1:])
-        np.maximum(highest[:, 1:], highest[:, :1], out=highest[:, 1:])
-        run, epoch = np.nonzero(highest[:, 1:] > highest[:, :-1])
-        self._runs, self._length = self._runs + runs, length
-        self._burn_in = np.concatenate([self._burn_in, highest[highest[:, 0] > self.floor, 0]])
-        self._before = np.concatenate([self._before, highest[run, epoch]])
-        self._record = np.concatenate([self._record, highest[run, epoch + 1]])
-        self._epoch = np.concatenate([self._epoch, epoch + 1])
+def calibrate_together(
+    detectors: Sequence[Detector],
+    clean: JointStatistics,
+    arl0s: Sequence[float],
+    *,
+    first_alarms: int = FIRST_ALARMS,
+    seed: int = 0,
+) -> list[Calibration]:
+    """The thresholds of several detectors at which the measured ARL₀ are those asked for, from common clean runs.
 
-    def at(self, threshold: float) -> tuple[int, int]:
-        """First alarms and epochs at risk with this threshold, not below the floor.
+    Each is the same as if its detector were calibrated alone.
 
-        The epoch of the alarm counts as at risk; a run that alarms in its burn-in does not count.
-        """
-        alarmed = (self._before <= threshold) & (threshold < self._record)
-        alarms = int(np.count_nonzero(alarmed))
-        quiet = self._runs - int(np.count_nonzero(self._burn_in > threshold)) - alarms
-        return alarms, int(self._epoch[alarmed].sum()) + self._length * quiet
+    Args:
+        detectors: whose statistics; they are not changed.
+        clean: where clean statistics come from.
+        arl0s: wanted, one of each detector, epochs.
+        first_alarms: at least so many decide; the relative half-width of the interval is 1.96 over their root.
+        seed: of the clean runs.
 
-    def threshold(self, arl0: float) -> float:
-        """The least threshold, to rounding, whose ARL₀ is not below ``arl0``."""
-        low, high = float(self._before.min()), float(self._record.max())
-        low = float(self._record.min()) - 1.0 if low == -math.inf else low
-        while True:
-            middle = 0.5 * (low + high)
-            if not low < middle < high:
-                return high
-            alarms, at_risk = self.at(middle)
-            low, high = (middle, high) if at_risk < arl0 * alarms else (low, middle)
-
-    def forget_below(self, floor: float) -> None:
-        """Drop what only thresholds below ``floor`` need; later runs are kept from there on only."""
-        self.floor = floor
-        self._burn_in = self._burn_in[self._burn_in > floor]
-        kept = self._record > floor
-        self._before, self._record, self._epoch = self._before[kept], self._record[kept], self._epoch[kept]
+    Raises:
+        ValueError: an ARL₀ is not greater than 1, fewer than 10 alarms are asked for, or no run gets through its
+            burn-in or ever has a higher statistic in it.
+    """
+    rng = np.random.default_rng(seed)
+    searches = [_Search(detector, arl0, first_alarms) for detector, arl0 in zip(detectors, arl0s, strict=True)]
+    while pending := [search for search in searches if search.result is None]:
+        found = clean([copy.copy(search.detector) for search in pending], RUNS, rng)
+        for search, (burn_in, statistics) in zip(pending, found, strict=True):
+            search.add(burn_in, statistics)
+    return [search.result for search in searches if search.result is not None]
 
 
 def calibrate(
     detector: Detector, clean: CleanStatistics, arl0: float, *, first_alarms: int = FIRST_ALARMS, seed: int = 0
 ) -> Calibration:
-    """The threshold at which the measured ARL₀ is the one asked for.
+    """The threshold at which the measured ARL₀ is the one asked for; arguments as in `calibrate_together`."""
 
-    Args:
-        detector: whose statistic; it is not changed.
-        clean: where clean statistics come from.
-        arl0: wanted, epochs.
-        first_alarms: at least so many decide; the relative half-width of the interval is 1.96 over their root.
-        seed: of the clean runs.
+    def alone(detectors: Sequence[Detector], runs: int, rng: np.random.Generator) -> list[tuple[Floats, Floats]]:
+        return [clean(detectors[0], runs, rng)]
 
-    Raises:
-        ValueError: ``arl0`` is not greater than 1, fewer than 10 alarms are asked for, or no run gets through its
-            burn-in or ever has a higher statistic in it.
-    """
-    arl0 = validation.above("calibration", "arl0", arl0, 1.0)
-    first_alarms = validation.whole("calibration", "first_alarms", first_alarms, 10)
-    rng = np.random.default_rng(seed)
-    counted = FirstAlarms()
-    while True:
-        counted.add(*clean(copy.copy(detector), RUNS, rng))
-        threshold = counted.threshold(arl0)
-        alarms, at_risk = counted.at(threshold)
-        if alarms >= first_alarms:
-            return _calibration(threshold, alarms, at_risk)
-        floor = counted.threshold(arl0 / 8.0)
-        if counted.at(floor)[0] >= FIRST_ALARMS:
-            counted.forget_below(floor)
+    return calibrate_together([detector], alone, [arl0], first_alarms=first_alarms, seed=seed)[0]
 
 
 def _calibration(threshold: float, alarms: int, at_risk: int) -> Calibration:
@@ -273,40 +170,140 @@ def measure_arl0(
     return _calibration(threshold, alarms, at_risk)
 
 
-_KNOWN: dict[tuple[str, str, str], Calibration] = {}
+# --- detectors ready for a scenario ---------------------------------------------------------------------------------
+
+_KNOWN: dict[tuple[str, str, str], Setting] = {}
 
 
 def calibrated(detector: Detector, scenario: Scenario, fidelity: str = "linear") -> Detector:
-    """The detector with its threshold set for a scenario.
+    """The detector with its threshold set for a scenario, as `calibrated_all` does."""
+    return calibrated_all([detector], scenario, fidelity)[0]
+
+
+def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: str = "linear") -> list[Detector]:
+    """The detectors with their thresholds set for a scenario, in order.
 
     A threshold from theory, from a preset or by hand stays. One that was asked for by its ARL₀ is calibrated, in a
-    copy: on white innovations where the scenario's filter is matched, else on clean runs of the scenario; once per
-    program for each pair of detector and scenario, always with the same noise. In a recorded scenario a shipped
-    threshold for white innovations stays, without an ARL₀.
+    copy: on white innovations where the scenario's filter is matched and the detector sees nothing else, else on clean
+    runs of the scenario, which detectors share; always with the same noise. A growth that the detector subtracts is
+    fitted before. In a recorded scenario a shipped threshold for white innovations stays, without an ARL₀.
+
+    What was found is remembered for each scenario and detector: in the program, and on disk (`calibration_cache`) where
+    the names of both say all about them.
 
     Raises:
         ValueError: calibration is needed, and the scenario lacks the fidelity or has no randomness to calibrate with.
     """
-    detector.bind(1, scenario.dimension)
-    if detector.target_arl0 is None or detector.calibrated:
-        return detector
-    if detector.threshold is not None and (scenario.matched or not scenario.random):
-        return detector
-    if not scenario.random:
+    for detector in detectors:
+        detector.bind(1, scenario.dimension)
+    wanted = [detector for detector in detectors if _needs_calibration(detector, scenario)]
+    if wanted and not scenario.random:
         raise ValueError(
-            f"detector {detector.name!r} cannot be calibrated in scenario {scenario.name!r}, which has one "
+            f"detector {wanted[0].name!r} cannot be calibrated in scenario {scenario.name!r}, which has one "
             "realisation: give it a threshold"
         )
-    key = (detector.name, scenario.name, fidelity)
-    if key not in _KNOWN:
-        if scenario.matched:
-            clean = white_statistics(scenario.linear_model().innovation_factor[0], scenario.timeline.num_epochs)
-        else:
-            clean = simulated_statistics(scenario, fidelity)
-        _KNOWN[key] = calibrate(detector, clean, detector.target_arl0)
+    missing = {detector.name: detector for detector in wanted if _recall(detector, scenario, fidelity) is None}
+    settings = _find(list(missing.values()), scenario, fidelity) if missing else {}
+    for name, setting in settings.items():
+        _KNOWN[name, scenario.name, fidelity] = setting
+        if key := _disk_key(missing[name], scenario, fidelity):
+            calibration_cache.store(key, setting, f"{name} in {scenario.name}, {fidelity}")
+    return [
+        _with(detector, _KNOWN[detector.name, scenario.name, fidelity]) if detector in wanted else detector
+        for detector in detectors
+    ]
+
+
+def _needs_calibration(detector: Detector, scenario: Scenario) -> bool:
+    if detector.calibrated:
+        return False
+    if detector.lacks_slope:
+        return True
+    if detector.target_arl0 is None:
+        return False
+    return detector.threshold is None or (scenario.random and not scenario.matched)
+
+
+def _disk_key(detector: Detector, scenario: Scenario, fidelity: str) -> str | None:
+    """The name of a result on disk; None where the names of detector and scenario do not say all about them."""
+    if not (calibration_cache.spelled_out(detector) and calibration_cache.spelled_out_scenario(scenario)):
+        return None
+    numbers = (RUNS, FIRST_ALARMS, SIMULATED_FIRST_ALARMS, SLOPE_RUNS)
+    return calibration_cache.key(scenario.name, detector.name, fidelity, *map(str, numbers))
+
+
+def _recall(detector: Detector, scenario: Scenario, fidelity: str) -> Setting | None:
+    """What was found before, in this program or in an earlier one."""
+    place = (detector.name, scenario.name, fidelity)
+    if place not in _KNOWN and (key := _disk_key(detector, scenario, fidelity)):
+        setting = calibration_cache.load(key)
+        if setting is not None:
+            _KNOWN[place] = setting
+    return _KNOWN.get(place)
+
+
+def _with(detector: Detector, setting: Setting) -> Detector:
+    """A copy of the detector with its slope and its threshold set."""
     ready = copy.copy(detector)
-    ready.set_threshold(_KNOWN[key].threshold, _KNOWN[key].arl0)
+    if setting.slope is not None:
+        ready.set_slope(setting.slope)
+    if setting.threshold is not None:
+        ready.set_threshold(setting.threshold, setting.arl0)
     return ready
+
+
+def _find(detectors: Sequence[Detector], scenario: Scenario, fidelity: str) -> dict[str, Setting]:
+    """Calibrate, by name: on white innovations what can be, the others in as few passes as give each its own noise."""
+    found: dict[str, Setting] = {}
+    groups: dict[int, list[Detector]] = {}
+    for detector in detectors:
+        if scenario.matched and not detector.needs_view and detector.target_arl0 is not None:
+            clean = white_statistics(scenario.linear_model().innovation_factor[0], scenario.timeline.num_epochs)
+            result = calibrate(detector, clean, detector.target_arl0)
+            found[detector.name] = Setting(result.threshold, result.arl0)
+        else:
+            # a burn-in of the filter that a companion asks for would change the runs
+            groups.setdefault(0 if scenario.matched else detector.memory, []).append(detector)
+    for group in groups.values():
+        found |= _find_simulated(group, scenario, fidelity)
+    return found
+
+
+def _find_simulated(detectors: Sequence[Detector], scenario: Scenario, fidelity: str) -> dict[str, Setting]:
+    """Calibrate on common clean runs, by name: first the slopes of those that lack them, then the thresholds."""
+    clean = joint_statistics(scenario, fidelity)
+    growing = [detector for detector in detectors if detector.lacks_slope]
+    slopes: dict[str, float] = {}
+    if growing:
+        runs = clean([copy.copy(detector) for detector in growing], SLOPE_RUNS, np.random.default_rng(1))
+        for detector, (_, statistics) in zip(growing, runs, strict=True):
+            slopes[detector.name] = growth(detector, scenario.timeline.times, statistics)
+    found = {detector.name: Setting(slope=slopes.get(detector.name)) for detector in detectors}
+    asked = [_with(detector, found[detector.name]) for detector in detectors if detector.target_arl0 is not None]
+    arl0s = [detector.target_arl0 for detector in asked if detector.target_arl0 is not None]
+    results = calibrate_together(asked, clean, arl0s, first_alarms=SIMULATED_FIRST_ALARMS)
+    for detector, result in zip(asked, results, strict=True):
+        found[detector.name] = Setting(result.threshold, result.arl0, slopes.get(detector.name))
+    return found
+
+
+def growth(detector: Detector, time: Floats, statistics: Floats) -> float:
+    """Slope of the least-squares line, its intercept free, through the mean statistic of clean runs, per second.
+
+    Args:
+        detector: for the message.
+        time: of the epochs, (K,), s.
+        statistics: (n, K); epochs in which all are 0, before a window is full, do not count.
+
+    Raises:
+        ValueError: fewer than two epochs count.
+    """
+    full = statistics.any(axis=0)
+    if np.count_nonzero(full) < 2:
+        raise ValueError(f"detector {detector.name!r}: the game is too short for its window")
+    since = time[full] - time[full].mean()
+    mean = statistics[:, full].mean(axis=0)
+    return float(np.sum(since * mean) / np.sum(since**2))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

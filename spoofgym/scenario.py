@@ -10,7 +10,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
-from spoofgym.navigation.interface import Demands, Navigator, Timeline
+from spoofgym.navigation.interface import Demands, Navigator, Timeline, manoeuvre_times
 from spoofgym.navigation.linear import LinearNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
 from spoofgym.navigation.loose import StrapdownNavigator
@@ -35,7 +35,12 @@ class Scenario(ABC):
         timeline: the epochs of the game.
         dimension: m, of the fix.
         drag_off_rate: the largest rate at which a spoofer moves the position, per axis (E, N, U), m/s.
-        error_scale: metres of navigation error that make a reward of 1.
+        error_scale: metres of navigation error that make a spoofer's reward of 1.
+        defender_scale: metres of navigation error that cost a defender 1.
+        depth_table: depths among which a defender chooses, epochs.
+        history: epochs that the navigator keeps at least, where somebody can backtrack.
+        bias_sigma: data-sheet bias of the IMU's gyros and accelerometers, constant and unstable part together, (6,),
+            rad/s and m/s².
         fidelities: the valid ones.
         matched: whether the filter's model is the truth, so that clean innovations are white.
         random: whether every episode is drawn anew; a recorded log has one realisation.
@@ -46,9 +51,21 @@ class Scenario(ABC):
     dimension: int
     drag_off_rate: tuple[float, float, float]
     error_scale: float
+    defender_scale: float = 10.0
+    depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
+    history: int = 60
     fidelities: tuple[str, ...] = FIDELITIES
     matched: bool
     random: bool = True
+
+    @property
+    @abstractmethod
+    def bias_sigma(self) -> Floats:
+        """Data-sheet bias of the IMU, (6,), rad/s and m/s²."""
+
+    def manoeuvres(self) -> tuple[float, ...]:
+        """Times within the game at which the vehicle begins to change its velocity, s."""
+        return manoeuvre_times(self.velocity(), self.timeline)
 
     @abstractmethod
     def times(self, burn_in: int) -> Floats:
@@ -116,7 +133,8 @@ class SimulatedScenario(Scenario):
         onset: time of epoch 0, the last clean fix, s.
         horizon: epochs of the game.
         drag_off_rate: largest rate of the spoofed position per axis, m/s.
-        error_scale: metres of error that make a reward of 1.
+        error_scale: metres of error that make a spoofer's reward of 1.
+        defender_scale: metres of error that cost a defender 1.
         true_position_random_walk: what really acts on the INS position, m/√s.
     """
 
@@ -130,6 +148,7 @@ class SimulatedScenario(Scenario):
     drag_off_rate: tuple[float, float, float]
     error_scale: float
     true_position_random_walk: float
+    defender_scale: float = 10.0
 
     def __post_init__(self) -> None:
         if self.horizon < 1:
@@ -176,7 +195,13 @@ class SimulatedScenario(Scenario):
             and not np.any(self.grade.instability_sigma)
             and self.true_position_random_walk == self.tuning.position_random_walk
             and self.tuning.process_noise_scale == 1.0
+            and (self.tuning.bias_states or not np.any(self.grade.bias_sigma))
         )
+
+    @property
+    def bias_sigma(self) -> Floats:
+        """Data-sheet bias of the IMU, (6,), rad/s and m/s²."""
+        return np.hypot(self.grade.bias_sigma, self.grade.instability_sigma)
 
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""

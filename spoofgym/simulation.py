@@ -34,6 +34,7 @@ class Simulation:
         epoch: the present epoch of every run, as `observe` left it.
         alarm: whether any detector alarms in the present epoch, (N,).
         offset: what the spoofer added to the present fix, (N, 3), m ENU.
+        decision: the response's, on the present epoch; to use every fix where there is none.
         used: whether the last `resolve` used the fix, (N,).
     """
 
@@ -77,12 +78,14 @@ class Simulation:
         self.streams = RunStreams.from_seed(seed, num_runs)
         for detector in detectors:
             detector.bind(num_runs, scenario.dimension)
+            detector.know(scenario.bias_sigma)
             if detector.threshold is None:
                 raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
         self.detectors = {detector.name: detector for detector in detectors}
         self.attack = attack
         if attack is not None:
             attack.bind(scenario.timeline, num_runs)
+            attack.follow(scenario.velocity())
         self.response = response
         if response is not None:
             response.bind(num_runs)
@@ -102,7 +105,7 @@ class Simulation:
         self._intervals = np.diff(self._times, prepend=self._times[0] - scenario.timeline.interval)
         self._noise = np.zeros((num_runs, len(self._times), scenario.dimension))
         self._all = np.arange(num_runs)
-        self._decision = Decision(np.ones(num_runs, dtype=bool))
+        self.decision = Decision(np.ones(num_runs, dtype=bool))
         self.used = np.zeros(num_runs, dtype=bool)
         self._no_offset = np.zeros((num_runs, 3))
         self.offset = self._no_offset.copy()
@@ -261,7 +264,7 @@ class Simulation:
             runs: which.
         """
         if decision is None:
-            decision = self._decision if runs is None else self._decision.of(runs)
+            decision = self.decision if runs is None else self.decision.of(runs)
         available = self.epoch.available
         if self.confounders is not None and available is not None:
             decision = replace(decision, use=decision.use & (available if runs is None else available[runs]))
@@ -311,7 +314,7 @@ class Simulation:
     def _decide(self) -> None:
         """The response sees each epoch once."""
         if self.response is not None:
-            self._decision = self.response.decide(self.epoch, self.alarm)
+            self.decision = self.response.decide(self.epoch, self.alarm)
 
     def _decide_first(self, runs: Runs, epoch: Epoch) -> None:
         """A copy of the response, for these runs alone, sees their epoch 0; the others see each epoch once."""
@@ -319,5 +322,5 @@ class Simulation:
             part = copy.copy(self.response)
             part.bind(len(runs))
             part.reset(np.arange(len(runs)))
-            self._decision = self._decision.put(runs, part.decide(epoch, self.alarm[runs]))
+            self.decision = self.decision.put(runs, part.decide(epoch, self.alarm[runs]))
             self.response.take(runs, part)

@@ -48,6 +48,18 @@ def probability(owner: str, name: str, value: Any) -> float:
     return number
 
 
+def share(owner: str, name: str, value: Any) -> float:
+    """The value as a number from 0 to 1.
+
+    Raises:
+        ValueError: it is not.
+    """
+    number = non_negative(owner, name, value)
+    if number > 1.0:
+        raise ValueError(_message(owner, name, "a share from 0 to 1", value))
+    return number
+
+
 def whole(owner: str, name: str, value: Any, least: int) -> int:
     """The value as a whole number of ``least`` or more.
 

@@ -8,7 +8,8 @@ import pytest
 from scipy import optimize, stats
 
 from spoofgym import calibration
-from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_interval, white_statistics
+from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_interval
+from spoofgym.clean_statistics import white_statistics
 from spoofgym.detectors import Acna, Snapshot, Windowed, make_detector
 
 UNLIKELY = 1e-7

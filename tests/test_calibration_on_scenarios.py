@@ -11,13 +11,8 @@ import pytest
 from scipy import stats
 
 from spoofgym import calibration
-from spoofgym.calibration import (
-    calibrate,
-    calibrated,
-    measure_arl0,
-    simulated_statistics,
-    white_statistics,
-)
+from spoofgym.calibration import calibrate, calibrated, measure_arl0
+from spoofgym.clean_statistics import simulated_statistics, white_statistics
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.chi_square import WINDOWED_THRESHOLDS
 from spoofgym.scenarios import make_scenario

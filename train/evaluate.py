@@ -1,7 +1,8 @@
-"""Evaluate spoofers against a detector.
+"""Evaluate spoofers against a detector, or defenders against populations of spoofers.
 
     python -m train.evaluate --scenario liu-flight --detector snapshot --attacker runs/x --seed 0 --json out.json
     python -m train.evaluate --scenario recorded:FOLDER --attack ramp:0.5 --detector snapshot --json -
+    python -m train.evaluate --scenario foi-drive --defender runs/d --json out.json --figure out.png
 
 The baselines are always evaluated: none, random, the best constant ramp, the closed form, the optimum, and the upper
 bound as a figure. Every attacker meets the same noise. A table goes to the terminal, a figure and JSON where asked;
@@ -19,7 +20,8 @@ from typing import Any
 from rich.console import Console
 
 from agents.baselines import exact_threshold
-from agents.learned import LearnedSpoofer
+from agents.defenders import parse
+from agents.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
@@ -31,9 +33,14 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded import RecordedScenario
 from train.arguments import count, picture, seed_number
 from train.attackers import Evaluation
+from train.defenders import POPULATIONS, evaluate_defenders
+from train.defenders_presentation import defenders_figure, defenders_tables
 from train.presentation import attackers_figure, attackers_table, recorded_table
 
 EPISODES = {"linear": 20_000, "strapdown": 1_000}
+DEFENDER_EPISODES = 4_000
+TABLES = {"attackers": attackers_table, "recorded": recorded_table, "defenders": defenders_tables}
+FIGURES = {"attackers": attackers_figure, "defenders": defenders_figure}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -46,9 +53,13 @@ def parser() -> argparse.ArgumentParser:
     add("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
     add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
     add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
+    add("--defender", action="append", default=[], metavar="RUN|SPEC",
+        help="run folder of a trained defender, or 'detector > response'; repeatable; evaluates defenders instead")
+    add("--population", action="append", choices=tuple(POPULATIONS),
+        help="of attacks on the defenders; repeatable (default: all)")
     add("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
-    add("--episodes", type=count, help="games of each attacker (default: 20000 linear, 1000 strapdown)")
+    add("--episodes", type=count, help="games of each player (default: 20000 linear, 1000 strapdown; defenders 4000)")
     add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
     add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
     add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
@@ -65,11 +76,10 @@ def main(arguments: list[str] | None = None) -> int:
     except (ValueError, FileNotFoundError) as error:
         Console(stderr=True).print(f"error: {error}", style="red", markup=False)
         return 2
-    table = recorded_table if report["kind"] == "recorded" else attackers_table
-    console.print(table(report))
+    console.print(TABLES[report["kind"]](report))
     if options.figure is not None:
         options.figure.parent.mkdir(parents=True, exist_ok=True)
-        attackers_figure(report, options.figure)
+        FIGURES[report["kind"]](report, options.figure)
         console.print(f"figure in {options.figure}", markup=False)
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
@@ -85,6 +95,8 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     fidelity = options.fidelity or scenario.fidelities[0]
     scenario.check_fidelity(fidelity)
+    if options.defender:
+        return _defenders(options, scenario, fidelity, console)
     given = options.detector or ["snapshot"]
     detectors = [calibrated(make_detector(name), scenario, fidelity) for name in given]
     if isinstance(scenario, RecordedScenario):
@@ -103,6 +115,22 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     attacks = [make_attack(text) for text in options.attack]
     rows = evaluation.rows(policies, attacks, console)
     return attackers_report(scenario, fidelity, detectors, rows)
+
+
+def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, console: Console) -> dict[str, Any]:
+    if options.attacker or options.attack or options.detector:
+        raise ValueError("--defender is evaluated on populations: it goes without --attacker, --attack and --detector")
+    policies, given = [], []
+    for text in options.defender:
+        if ">" in text:
+            given.append(parse(text))
+        else:
+            policies.append(LearnedDefender.load(Path(text)))
+    populations = options.population or tuple(POPULATIONS)
+    episodes = options.episodes or DEFENDER_EPISODES
+    return evaluate_defenders(
+        scenario, fidelity, policies, given, populations, episodes, options.seed, options.threads, console
+    )
 
 
 def _recorded(options: argparse.Namespace, scenario: Scenario, detectors: list[Detector]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ is learned is evaluated in the real game.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,6 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Flags, Runs
 from spoofgym.detectors.chi_square import Snapshot
 from spoofgym.envs.config import SpooferConfig
-from spoofgym.envs.spoofer_game import Outcome
 from spoofgym.envs.vector import SpooferVectorEnv
 from spoofgym.optimum.survival import log_survival
 from spoofgym.scenarios import make_scenario
@@ -65,7 +65,7 @@ class ExpectedAlarmVectorEnv(SpooferVectorEnv):
         self._survival = np.ones(num_envs)
         self._gained = np.zeros(num_envs)
 
-    def _play(self, actions: NDArray[np.float32], restarting: Runs | None) -> tuple[Outcome, Flags]:
+    def _play(self, actions: NDArray[np.float32], restarting: Runs | None) -> tuple[Any, Flags]:
         outcome, truncated = super()._play(actions, restarting)
         shadow = self.game.shadow
         assert shadow is not None

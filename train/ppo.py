@@ -7,12 +7,15 @@ cost, so the rollout is one whole game of many lanes, cut into a few large minib
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
@@ -108,17 +111,23 @@ def write_config(folder: Path, config: SpooferConfig, settings: Settings, seed: 
 def export(learner: PPO, config: SpooferConfig, folder: Path) -> LearnedSpoofer:
     """The learner's policy as plain arrays, also written into ``folder``."""
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
-    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
     vector: SpooferVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
-    policy = LearnedSpoofer(
-        folder.resolve().name,
-        config,
-        tuple(field.name for field in vector.game.fields),
+    layout = tuple(field.name for field in vector.game.fields)
+    policy = LearnedSpoofer(folder.resolve().name, config, layout, *arrays(layers))
+    policy.save(folder)
+    return policy
+
+
+Arrays = tuple[NDArray[np.float32], ...]
+
+
+def arrays(layers: Sequence[torch.nn.Module]) -> tuple[Arrays, Arrays]:
+    """Weights and biases of the linear ones among ``layers``."""
+    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
+    return (
         tuple(layer.weight.detach().numpy().copy() for layer in linear),
         tuple(layer.bias.detach().numpy().copy() for layer in linear),
     )
-    policy.save(folder)
-    return policy
 
 
 def save_checkpoint(learner: PPO, folder: Path) -> None:

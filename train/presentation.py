@@ -13,7 +13,8 @@ BASELINE, LEARNED, BOUND = "#9a9a9a", "#0072b2", "#d55e00"
 BASELINES = ("none", "random", "best-ramp", "closed-form", "optimum", "upper-bound")
 
 
-def _number(value: float | None, form: str = ".1f") -> str:
+def number(value: float | None, form: str = ".1f") -> str:
+    """A figure of a table; a dash where there is none."""
     return "–" if value is None else format(value, form)
 
 
@@ -41,11 +42,11 @@ def attackers_table(report: dict[str, Any]) -> Table:
             row["attacker"],
             row["knowledge"],
             error,
-            _number(row["exact_undetected_error_m"], ".2f"),
-            _number(row["detection_probability"], ".3f"),
-            _number(row["median_time_to_detect_s"], ".0f"),
-            _number(row["error_at_detection_m"]),
-            _number(row["fraction_of_optimum"], ".3f"),
+            number(row["exact_undetected_error_m"], ".2f"),
+            number(row["detection_probability"], ".3f"),
+            number(row["median_time_to_detect_s"], ".0f"),
+            number(row["error_at_detection_m"]),
+            number(row["fraction_of_optimum"], ".3f"),
             style="bold" if row["attacker"] not in BASELINES else "",
         )
     return table
@@ -76,15 +77,15 @@ def recorded_table(report: dict[str, Any]) -> Table:
     for row in report["rows"]:
         table.add_row(
             row["attack"],
-            _number(row["clean_error_median_m"], ".2f"),
-            _number(row["clean_error_p95_m"], ".2f"),
-            _number(row["mean_nis"], ".2f"),
+            number(row["clean_error_median_m"], ".2f"),
+            number(row["clean_error_p95_m"], ".2f"),
+            number(row["mean_nis"], ".2f"),
             str(row["false_alarms"]),
             str(row["clean_epochs"]),
             "yes" if row["detected"] else "no",
-            _number(row["time_to_detect_s"], ".1f"),
-            _number(row["error_at_detection_m"]),
-            _number(row["max_error_m"]),
+            number(row["time_to_detect_s"], ".1f"),
+            number(row["error_at_detection_m"]),
+            number(row["max_error_m"]),
         )
     return table
 

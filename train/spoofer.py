@@ -14,21 +14,18 @@ import argparse
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from stable_baselines3 import PPO
-from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.learned import CONFIG_FILE
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig
 from spoofgym.scenario import FIDELITIES
 from train.arguments import count, seed_number
 from train.ppo import CHECKPOINT_FILE, Settings, export, load_checkpoint, make_learner, save_checkpoint, write_config
+from train.watch import Watch, mean_return
 
 DEFAULT_STEPS = 3_200_000
 
@@ -50,62 +47,6 @@ def parser() -> argparse.ArgumentParser:
     add("--threads", type=count, default=1, help="of the learner and the simulation (default: %(default)s)")
     add("--resume", action="store_true", help="go on from the checkpoint in the run folder")
     return result
-
-
-class Watch(BaseCallback):
-    """Progress bar over trials and training, checkpoints after every tenth of the run, and the mean return.
-
-    Attributes:
-        steps_before: steps of the learners before the present one, which the bar counts, too.
-    """
-
-    def __init__(self, config: SpooferConfig, folder: Path, steps: int, console: Console) -> None:
-        super().__init__()
-        self._config, self._folder, self._steps = config, folder, steps
-        self.steps_before = 0
-        self._progress = Progress(
-            TextColumn("training"),
-            BarColumn(bar_width=20),
-            TextColumn("{task.percentage:>3.0f} %"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[result]}"),
-            console=console,
-        )
-        self._task = self._progress.add_task("training", total=steps, result="")
-        self._next_checkpoint = steps // 10
-
-    def start(self) -> None:
-        """Show the bar."""
-        self._progress.start()
-
-    def stop(self) -> None:
-        """Leave the terminal as it was."""
-        self._progress.stop()
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_end(self) -> None:
-        played = self.steps_before + self.num_timesteps
-        gained = mean_return(self.model) * self._scale()
-        self._progress.update(self._task, completed=min(played, self._steps), result=f"mean gain {gained:.1f} m")
-
-    def _scale(self) -> float:
-        return float(self.training_env.unwrapped.vector_env.game.scenario.error_scale)  # type: ignore[attr-defined]
-
-    def _on_rollout_start(self) -> None:
-        if self.num_timesteps >= self._next_checkpoint:
-            self._next_checkpoint = self.num_timesteps + self._steps // 10
-            export(self.model, self._config, self._folder)  # type: ignore[arg-type]
-            save_checkpoint(self.model, self._folder)  # type: ignore[arg-type]
-
-
-def mean_return(learner: BaseAlgorithm) -> float:
-    """Mean return of the last hundred games, or 0 before any has ended."""
-    episodes: Any = learner.ep_info_buffer or []
-    return float(np.mean([episode["r"] for episode in episodes])) if episodes else 0.0
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -156,7 +97,10 @@ class Training:
         self._config, self._settings, self._seed, self._steps = config, settings, seed, steps
         self._folder, self._console = folder, console
         self._learner = learner
-        self._watch = Watch(config, folder, steps, console)
+        scale = float(learner.get_env().unwrapped.vector_env.game.scenario.error_scale)  # type: ignore[union-attr]
+        self._watch = Watch(
+            steps, console, lambda present: f"mean gain {mean_return(present) * scale:.1f} m", self._keep
+        )
 
     def run(self, resume: bool) -> int:
         """Train, or go on from the checkpoint; returns the exit status."""
@@ -174,8 +118,7 @@ class Training:
             interrupted = True
         finally:
             self._watch.stop()
-        export(self._learner, self._config, self._folder)
-        save_checkpoint(self._learner, self._folder)
+        self._keep(self._learner)
         played = self._watch.steps_before + self._learner.num_timesteps - before
         seconds = time.perf_counter() - begin
         self._console.print(
@@ -188,6 +131,10 @@ class Training:
                 f"go on with: python -m train.spoofer --resume --out {self._folder} --steps {self._steps}", markup=False
             )
         return 130 if interrupted else 0
+
+    def _keep(self, learner: PPO) -> None:
+        export(learner, self._config, self._folder)
+        save_checkpoint(learner, self._folder)
 
     def _try_beginnings(self) -> None:
         """Short trainings from different beginnings: which direction an attack takes is decided early, by chance."""

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+from collections.abc import Callable, Sequence
 
+from spoofgym.attacks.azimuth import FOI_ATTACKS, Azimuth
 from spoofgym.attacks.base import Attack
+from spoofgym.attacks.families import (
+    ClimbingSpiral,
+    DecayingJump,
+    RandomGrowth,
+    RandomJump,
+    RandomRamp,
+    SignChangingRamp,
+    TwoStageRamp,
+)
+from spoofgym.attacks.pool import POPULATIONS, AttackPool
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
-from spoofgym.specification import build
+from spoofgym.specification import Specification, build
 
 ATTACKS: dict[str, Callable[..., Attack]] = {
     "none": NoAttack,
@@ -14,6 +26,16 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "ramp": Ramp,
     "jump-ramp": JumpRamp,
     "slow-change": SlowChange,
+    "azimuth": Azimuth,
+    **FOI_ATTACKS,
+    "random-ramp": RandomRamp,
+    "random-jump": RandomJump,
+    "random-growth": RandomGrowth,
+    "two-stage-ramp": TwoStageRamp,
+    "sign-changing-ramp": SignChangingRamp,
+    "decaying-jump": DecayingJump,
+    "climbing-spiral": ClimbingSpiral,
+    **POPULATIONS,
 }
 
 
@@ -24,3 +46,26 @@ def make_attack(attack: str | Attack) -> Attack:
         ValueError: unknown name or option, or a value that does not fit; the message lists the valid ones.
     """
     return attack if isinstance(attack, Attack) else build(attack, ATTACKS, "attack")
+
+
+def opponents(attacks: str | Attack | Sequence[str | Attack], clean: float) -> AttackPool:
+    """The pool from which a defender's opponents are drawn.
+
+    Args:
+        attacks: a population by its name, with options; a pool, which keeps its own share; an attack; or several, which
+            then have equal weights.
+        clean: share of games without an attack.
+
+    Raises:
+        ValueError: an unknown attack, or a share that is given twice.
+    """
+    if isinstance(attacks, AttackPool):
+        return copy.deepcopy(attacks)
+    if isinstance(attacks, str) and Specification.parse(attacks).name in POPULATIONS:
+        if "clean" in Specification.parse(attacks).options:
+            raise ValueError(f"the share of clean games is given by clean={clean:g}, not in {attacks!r}")
+        pool = make_attack(f"{attacks},clean={clean!r}")
+        assert isinstance(pool, AttackPool)
+        return pool
+    several = [attacks] if isinstance(attacks, str | Attack) else list(attacks)
+    return AttackPool([(copy.deepcopy(make_attack(item)), 1.0) for item in several], clean)

@@ -48,6 +48,18 @@ class Attack(ABC):
     def reset(self, runs: Runs, streams: RunStreams) -> None:  # noqa: B027 - a profile without noise draws nothing
         """Start new episodes; a random attack draws here, a block per run from the stream "opponent"."""
 
+    def follow(self, velocity: Floats) -> None:  # noqa: B027 - most attacks do not care where the vehicle goes
+        """Take the vehicle's true velocity at epochs 0..K, which a spoofer tracks, (K+1, 3), ENU, m/s; after `bind`."""
+
+    def episode(self, runs: Runs, streams: RunStreams) -> Floats:
+        """Start new episodes of some runs and look at all that they will send, (n, K+1, 3), m ENU."""
+        self.reset(runs, streams)
+        timeline, everyone = self._timeline, np.ones(self._num_runs, dtype=np.int64)
+        offsets = [
+            self.offset(Clock(k * everyone, time * everyone))[runs] for k, time in enumerate(timeline.times.tolist())
+        ]
+        return np.stack(offsets, axis=1)
+
     def elapsed(self, clock: Clock) -> Floats:
         """Time since the onset, (N,), s; zero before it."""
         return np.maximum(clock.time - self._onset, 0.0)

@@ -24,6 +24,8 @@ class Detector(ABC):
             given otherwise.
         calibrated: the threshold was set on clean runs, and ``arl0`` holds where they came from.
         demands: what it asks of the navigator beside innovations, e.g. an unaided inertial solution.
+        needs_view: it reads the epoch's view, so that only simulated runs can calibrate it.
+        lacks_slope: its statistic grows along clean runs, and `set_slope` has not told yet how fast.
         memory: epochs that the statistic looks back, the present one left out; a warm start needs as many clean epochs.
     """
 
@@ -32,6 +34,8 @@ class Detector(ABC):
     target_arl0: float | None = None
     calibrated: bool = False
     demands: Demands = Demands()
+    needs_view: bool = False
+    lacks_slope: bool = False
     memory: int = 0
 
     @property
@@ -41,6 +45,9 @@ class Detector(ABC):
 
     def bind(self, num_runs: int, dimension: int) -> None:  # noqa: B027 - a snapshot needs no memory
         """Allocate the memory of ``num_runs`` runs for fixes of ``dimension`` m (3 or 6)."""
+
+    def know(self, bias_sigma: Floats) -> None:  # noqa: B027 - most tests do without
+        """Learn, after `bind`, the data-sheet biases of gyros and accelerometers, (6,), rad/s and m/s²."""
 
     def reset(self, runs: Runs) -> None:  # noqa: B027 - a snapshot has nothing to forget
         """Forget everything about these runs."""
@@ -58,6 +65,14 @@ class Detector(ABC):
         self.threshold = validation.above(self.name, "threshold", threshold)
         self.arl0 = arl0
         self.calibrated = True
+
+    def set_slope(self, slope: float) -> None:
+        """Take from calibration how fast the statistic grows along clean runs, per second.
+
+        Raises:
+            TypeError: this detector subtracts no growth.
+        """
+        raise TypeError(f"detector {self.name!r} subtracts no growth")
 
     def take(self, runs: Runs, other: Detector) -> None:
         """Copy the memory of ``other``, a copy of this detector bound to fewer runs; its run j becomes ``runs[j]``.

@@ -23,6 +23,11 @@ DEFAULT_WINDOW = 20
 SHADMEHRI_THRESHOLD = 25.9
 """Chi-square quantile for 3 degrees of freedom at 1e-5 as published (Shadmehri and Esfanjani 2025, eq 15)."""
 
+FOI_THRESHOLDS: dict[int, float] = {6: 1.0, 21: 2.0}
+"""Thresholds of the windowed test by n = k + 1 (FOI-R-5687, table 4): the greatest value of clean runs, rounded up. The
+report's receiver states three metres per axis and errs by far less, so that its nis hardly ever come near chi-square.
+"""
+
 WINDOWED_THRESHOLDS: dict[tuple[int, int, float], float] = {(3, 20, 1e5): 114.41}
 """Thresholds of the windowed test by (m, n, ARL0), for white innovations. A row is reproduced, with its interval, by
 ``python -m spoofgym.calibration --dimension 3 --window 20 --arl0 1e5``; the 95 % interval of their ARL0 is ± 3 %.
@@ -108,8 +113,9 @@ class Snapshot(Detector):
 class Windowed(Detector):
     """Chi-square test of a sliding window: the sum of the nis of the last n epochs, m n degrees of freedom.
 
-    ``n`` counts terms. FOI-R-5687's k counts the epochs before the present one: its test (3) sums k + 1 terms and calls
-    their degrees of freedom 3k. Until n epochs have come the sum is over what there is.
+    ``n`` counts terms. FOI-R-5687's k counts the epochs before the present one: its test (3) sums n = k + 1 terms, so
+    that fixes of position give it 3 (k + 1) degrees of freedom, not the 3k that its text states. Until n epochs have
+    come the sum is over what there is; an epoch without a fix counts as zero.
 
     Windows overlap, so ARL0 is not 1 / P_FA: it is calibrated. With nothing given it is 1e5. Thresholds in
     `WINDOWED_THRESHOLDS` are taken from there; for any other combination ``threshold`` is None until calibration sets
@@ -120,14 +126,16 @@ class Windowed(Detector):
         threshold: compared with the sum, no unit.
         p_fa: probability that the statistic of one epoch exceeds the threshold; ``arl0`` then stays unknown.
         preset: ``shadmehri``, the published 25.9 for the mean of the window, so 25.9 n for the sum. It is the quantile
-            of a single epoch: the false-alarm probability of a mean of 5 is 3e-20 instead of 1e-5.
+            of a single epoch: the false-alarm probability of a mean of 5 is 3e-20 instead of 1e-5. ``foi``: the
+            empirical 1 for n = 6 and 2 for n = 21 (k = 5 and 20), for a receiver that over-states its errors as FOI's
+            does; with an honest covariance nearly every epoch exceeds them.
         arl0: average run length between false alarms, epochs.
 
     Raises:
-        ValueError: more than one of the last four is given, or a value is out of range.
+        ValueError: more than one of the last four is given, a preset for another n, or a value is out of range.
     """
 
-    PRESETS = ("shadmehri",)
+    PRESETS = ("shadmehri", "foi")
 
     def __init__(
         self,
@@ -143,6 +151,9 @@ class Windowed(Detector):
         self.threshold = None if threshold is None else validation.above("windowed", "threshold", threshold)
         self._p_fa = None if p_fa is None else validation.probability("windowed", "p_fa", p_fa)
         self._preset = None if preset is None else validation.one_of("windowed", "preset", preset, self.PRESETS)
+        if preset == "foi" and self.n not in FOI_THRESHOLDS:
+            valid = " and ".join(str(terms) for terms in FOI_THRESHOLDS)
+            raise ValueError(f"windowed: preset foi is for n = {valid} (k + 1), got {self.n}")
         if threshold is None and p_fa is None and preset is None:
             self.target_arl0 = validation.above("windowed", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
         self._name = spell(
@@ -186,7 +197,7 @@ class Windowed(Detector):
         if self._preset is not None:
             if dimension != 3:
                 raise ValueError(f"{self.name}: published for fixes of dimension 3, got {dimension}; give p_fa or arl0")
-            return SHADMEHRI_THRESHOLD * self.n
+            return FOI_THRESHOLDS[self.n] if self._preset == "foi" else SHADMEHRI_THRESHOLD * self.n
         if self.target_arl0 is not None:
             return WINDOWED_THRESHOLDS.get((dimension, self.n, self.target_arl0))
         return self._given

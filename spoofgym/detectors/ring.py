@@ -8,31 +8,38 @@ from spoofgym.arrays import Floats, Runs
 
 
 class Ring:
-    """The last n values of N runs, zero where fewer have come.
+    """The last n values of N runs, each a number or a vector of ``width`` numbers; ``empty`` where fewer have come.
 
     Every run writes at its own place, which a reset takes back to the start: what a run holds, and in which order,
     depends on its own episode alone. Reduce ``values`` along axis 1, of fixed length: the result of a run is then
     bit-identical for any N.
 
     Attributes:
-        values: (N, n), in no particular order.
+        values: (N, n) or (N, n, width), in no particular order.
     """
 
-    def __init__(self, num_runs: int, length: int) -> None:
-        self.values: Floats = np.zeros((num_runs, length))
-        self._flat = self.values.reshape(-1)
+    def __init__(self, num_runs: int, length: int, width: int | None = None, empty: float = 0.0) -> None:
+        shape = () if width is None else (width,)
+        self.values: Floats = np.full((num_runs, length, *shape), empty)
+        self._empty = empty
+        self._flat = self.values.reshape(num_runs * length, *shape)
         self._start = np.arange(num_runs) * length
         self._place = self._start.copy()
         self._next = np.arange(1, num_runs * length + 1)
         self._next[length - 1 :: length] -= length
 
+    @property
+    def oldest(self) -> Floats:
+        """The value that each run would overwrite next, (N,) or (N, width): after a push, n - 1 pushes old."""
+        return np.asarray(self._flat[self._place])
+
     def reset(self, runs: Runs) -> None:
         """Forget the values of these runs."""
-        self.values[runs] = 0.0
+        self.values[runs] = self._empty
         self._place[runs] = self._start[runs]
 
     def push(self, value: Floats) -> None:
-        """Write each run's value (N,) over its oldest one."""
+        """Write each run's value, (N,) or (N, width), over its oldest one."""
         self._flat[self._place] = value
         self._place = self._next.take(self._place)
 

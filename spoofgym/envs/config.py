@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
+from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
@@ -12,6 +13,8 @@ from spoofgym.scenario import Scenario
 KNOWLEDGE = ("blind", "shadow", "full")
 ACTIONS = ("rate", "innovation")
 ON_ALARM = ("end", "respond")
+
+DEFENDER_DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "relative-motion:k=20")
 
 Config = TypeVar("Config")
 
@@ -70,5 +73,39 @@ class SpooferConfig:
             raise ValueError(f"forfeit must be 0 or more and finite, got {self.forfeit}")
         if not 0 <= self.tracking_sigma < float("inf"):
             raise ValueError(f"tracking_sigma must be 0 or more metres, got {self.tracking_sigma}")
+        if self.threads < 1:
+            raise ValueError(f"threads must be 1 or more, got {self.threads}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DefenderConfig:
+    """Arguments of Defender-v0; the environment's page says what each means.
+
+    Raises:
+        ValueError: a number out of range.
+    """
+
+    scenario: str | Scenario = "foi-drive"
+    attacks: str | Attack | tuple[str | Attack, ...] = "training"
+    detectors: str | Detector | tuple[str | Detector, ...] = DEFENDER_DETECTORS
+    fidelity: str = "linear"
+    clean: float = 0.5
+    outage: float = 0.15
+    multipath: float = 0.15
+    error_scale: float | None = None
+    error_clip: float = 5.0
+    exclusion_cost: float = 0.05
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("clean", "outage", "multipath"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} must be a share from 0 to 1, got {getattr(self, name)}")
+        if self.error_scale is not None and not 0.0 < self.error_scale < float("inf"):
+            raise ValueError(f"error_scale must be positive metres, or None for the scenario's, got {self.error_scale}")
+        if not 0.0 < self.error_clip < float("inf"):
+            raise ValueError(f"error_clip must be positive and finite, got {self.error_clip}")
+        if not 0.0 <= self.exclusion_cost < float("inf"):
+            raise ValueError(f"exclusion_cost must be 0 or more and finite, got {self.exclusion_cost}")
         if self.threads < 1:
             raise ValueError(f"threads must be 1 or more, got {self.threads}")

@@ -213,3 +213,17 @@ class SpooferGame:
                 for statistic, threshold in zip(epoch.statistics.values(), self._thresholds, strict=True):
                     parts.append(np.stack([statistic / threshold, np.full(self.num_lanes, threshold)], axis=1))
         return self._squash(np.concatenate(parts, axis=1))
+
+    def reset_values(self) -> dict[str, Any]:
+        """Infos after a reset, of all lanes."""
+        return {"epoch": self.index, "error": self.error}
+
+    def step_values(self, outcome: Outcome) -> dict[str, Any]:
+        """Infos after a step, of all lanes."""
+        terms = {"growth": outcome.growth, "forfeit": outcome.forfeit}
+        return {"epoch": self.index, "error": self.error, "alarm": outcome.alarm, "reward_terms": terms}
+
+    def end_values(self, outcome: Outcome) -> dict[str, Any]:
+        """Infos of games that are over."""
+        words = np.where(outcome.alarmed, "detected", "undetected").astype(object)
+        return {"outcome": words, "is_success": ~outcome.alarmed}

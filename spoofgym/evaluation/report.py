@@ -79,6 +79,36 @@ def attackers_report(
     }
 
 
+def defenders_report(
+    scenario: Scenario,
+    fidelity: str,
+    kinds: dict[str, str],
+    rows: list[dict[str, Any]],
+    comparisons: list[dict[str, Any]],
+    gaps: list[dict[str, Any]],
+) -> dict[str, Any]:
+    """A whole ``"defenders"`` report.
+
+    Args:
+        scenario: of the games.
+        fidelity: of the simulation.
+        kinds: of each defender, by its name.
+        rows: of each defender and attack.
+        comparisons: paired differences between learned defenders and the others.
+        gaps: shares of the gap to the best depth in hindsight that learned defenders close.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "defenders",
+        "scenario": scenario.name,
+        "fidelity": fidelity,
+        "kinds": kinds,
+        "rows": rows,
+        "comparisons": comparisons,
+        "gaps": gaps,
+    }
+
+
 def recorded_report(scenario: Scenario, detectors: Sequence[Detector], rows: list[dict[str, Any]]) -> dict[str, Any]:
     """A whole ``"recorded"`` report."""
     return {

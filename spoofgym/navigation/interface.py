@@ -15,6 +15,11 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.streams import RunStreams
 
+MANOEUVRE = 0.3
+"""Horizontal acceleration between epochs above which a vehicle manoeuvres, m/s²."""
+QUIET = 2.0
+"""Time without any before a manoeuvre counts as a new one, s."""
+
 
 @dataclass(frozen=True)
 class Timeline:
@@ -39,6 +44,19 @@ class Timeline:
     def times(self) -> Floats:
         """Scenario time of epochs 0..K, (K+1,), s."""
         return np.asarray(self.start + self.interval * np.arange(self.num_epochs + 1), dtype=np.float64)
+
+
+def manoeuvre_times(velocity: Floats, timeline: Timeline) -> tuple[float, ...]:
+    """Times at which an acceleration begins after a quiet stretch, s; one that is under way at epoch 0 is left out.
+
+    Args:
+        velocity: at epochs 0..K, (K+1, 3), ENU, m/s.
+        timeline: of these epochs.
+    """
+    step = np.hypot(*np.diff(velocity[:, :2], axis=0).T) / timeline.interval > MANOEUVRE
+    needed = max(round(QUIET / timeline.interval), 1)
+    quiet = [k > 0 and not step[max(k - needed, 0) : k].any() for k in range(len(step))]
+    return tuple(timeline.times[np.flatnonzero(step & np.array(quiet))].tolist())
 
 
 @dataclass(frozen=True)
@@ -220,7 +238,7 @@ class FilterView:
     """
 
     def __init__(self, navigator: Navigator, true_velocity: Floats, runs: Runs) -> None:
-        """Look at ``runs`` of a navigator; ``true_velocity`` at the epochs of its model, (E, 3), carries the estimate."""
+        """Look at ``runs`` of a navigator; ``true_velocity``, (E, 3), of its model's epochs carries the estimate."""
         self._navigator, self._true_velocity, self._runs = navigator, true_velocity, runs
 
     @cached_property

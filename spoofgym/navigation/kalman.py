@@ -8,9 +8,8 @@ The update is written in whitened form: with S = L L', U = P H' L⁻ᵀ and w = 
 
     K z = U w,        P⁺ = P - U U',        NIS = w' w,
 
-which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. U is stored by columns, as U'
-(m, 15), so that every inner loop runs along a row. Source: Bar-Shalom, Li and
-Kirubarajan 2001, ch. 5, rearranged.
+which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. U is stored by columns, as
+U' (m, 15), so that every inner loop runs along a row. Source: Bar-Shalom, Li and Kirubarajan 2001, ch. 5, rearranged.
 """
 
 from __future__ import annotations

@@ -24,6 +24,8 @@ class FilterTuning:
             2018, appendix D: 3); the bias sigmas are the data sheet's.
         position_random_walk: process noise of the position, m/√s: the errors of the navigation computation.
         process_noise_scale: factor on the variance of the inertial process noise.
+        bias_states: whether the filter estimates the biases of the IMU; without, their variances are zero, so that the
+            gains are, and nine states are left.
         measurement_sigma: the filter's R, 1 sigma per axis of the fix, (3,) m or (6,) m and m/s.
     """
 
@@ -34,6 +36,7 @@ class FilterTuning:
     position_random_walk: float = 1.0 / 60.0
     process_noise_scale: float = 1.0
     measurement_sigma: tuple[float, ...] = (3.7, 3.7, 6.0)
+    bias_states: bool = True
 
     def __post_init__(self) -> None:
         if len(self.measurement_sigma) not in (3, 6) or min(self.measurement_sigma) <= 0:
@@ -57,6 +60,8 @@ class FilterTuning:
         walk = 2.0 * grade.instability_sigma**2 / grade.correlation_time
         inertial = np.concatenate([grade.noise_density**2, np.full(3, self.position_random_walk**2), walk])
         inertial[:6] *= self.process_noise_scale
+        if not self.bias_states:
+            inertial[9:] = 0.0
         return inertial
 
     @property

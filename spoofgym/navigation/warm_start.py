@@ -45,7 +45,10 @@ class WarmStart:
 
 def cold_start(grade: ImuGrade, receiver: Receiver, tuning: FilterTuning) -> WarmStart:
     """At power-on: no bias is estimated yet, so that the bias errors are the biases themselves."""
-    filter_covariance = np.diag((tuning.initial_scale * tuning.initial_sigma(grade)) ** 2)
+    believed = tuning.initial_scale * tuning.initial_sigma(grade)
+    if not tuning.bias_states:
+        believed[NUM_NAVIGATION:] = 0.0
+    filter_covariance = np.diag(believed**2)
     joint = np.zeros((NUM_JOINT, NUM_JOINT))
     joint[ERROR, ERROR] = np.diag(tuning.initial_sigma(grade) ** 2)
     for part, sigma in ((INSTABILITY, grade.instability_sigma), (CONSTANT_BIAS, grade.bias_sigma)):

@@ -4,11 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from spoofgym.responses.ardupilot import ArduPilotClip, ArduPilotGlitch
+from spoofgym.responses.backtrack import ExcludeAndBacktrack
 from spoofgym.responses.base import Response
-from spoofgym.responses.exclude import AlwaysUse, Exclude
+from spoofgym.responses.constant_velocity import ConstantVelocityStart
+from spoofgym.responses.exclude import AlwaysUse, Exclude, Latch
+from spoofgym.responses.onset_depth import OnsetDepth
+from spoofgym.responses.px4 import Px4Auto, Px4DeadReckoning
 from spoofgym.specification import build
 
-RESPONSES: dict[str, Callable[..., Response]] = {"always-use": AlwaysUse, "exclude": Exclude}
+RESPONSES: dict[str, Callable[..., Response]] = {
+    "always-use": AlwaysUse,
+    "exclude": Exclude,
+    "latch": Latch,
+    "exclude-and-backtrack": ExcludeAndBacktrack,
+    "constant-velocity-start": ConstantVelocityStart,
+    "onset-depth": OnsetDepth,
+    "px4-auto": Px4Auto,
+    "px4-dead-reckoning": Px4DeadReckoning,
+    "ardupilot-glitch": ArduPilotGlitch,
+    "ardupilot-clip": ArduPilotClip,
+}
 
 
 def make_response(response: str | Response) -> Response:

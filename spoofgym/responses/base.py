@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+import numpy as np
+
 from spoofgym.arrays import Flags, Runs, take_runs
 from spoofgym.navigation.interface import Decision, Demands, Epoch
+
+
+def given(epoch: Epoch) -> Flags:
+    """Whether the receiver gives a fix, (N,)."""
+    return np.ones(len(epoch.index), dtype=bool) if epoch.available is None else epoch.available
 
 
 class Response(ABC):

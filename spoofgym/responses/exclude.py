@@ -1,12 +1,14 @@
-"""The two simplest responses: none, and leaving the fix out while an alarm lasts."""
+"""The simplest responses: none, leaving the fix out while an alarm lasts, and leaving GNSS out for good."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spoofgym.arrays import Flags
 from spoofgym.navigation.interface import Decision, Demands, Epoch
 from spoofgym.responses.base import Response
+from spoofgym.responses.excluding import ExcludingResponse
+from spoofgym.responses.reuse import Never, reuse_rule
 
 
 class AlwaysUse(Response):
@@ -19,19 +21,32 @@ class AlwaysUse(Response):
         """The specification that builds this response."""
         return "always-use"
 
-    def decide(self, epoch: Epoch, alarm: NDArray[np.bool_]) -> Decision:
+    def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
         """Use it."""
         return Decision(np.ones_like(alarm))
 
 
-class Exclude(Response):
-    """The fix is left out while an alarm lasts, and the INS coasts."""
+class Exclude(ExcludingResponse):
+    """The fix is left out from an alarm on, and the INS coasts; nothing is taken back.
 
-    @property
-    def name(self) -> str:
-        """The specification that builds this response."""
-        return "exclude"
+    Args:
+        reuse: consecutive consistent fixes after which GNSS is used again; 0 = as soon as no detector alarms.
+        reuse_threshold: of the NIS of a consistent fix; None = the chi-square quantile at 1e-3.
 
-    def decide(self, epoch: Epoch, alarm: NDArray[np.bool_]) -> Decision:
-        """Use it where there is no alarm."""
-        return Decision(~alarm)
+    Raises:
+        ValueError: a value out of range, or a threshold without a number of fixes.
+    """
+
+    kind = "exclude"
+
+    def __init__(self, reuse: int = 0, reuse_threshold: float | None = None) -> None:
+        super().__init__(reuse_rule(self.kind, reuse, reuse_threshold))
+
+
+class Latch(ExcludingResponse):
+    """The first alarm excludes GNSS for good."""
+
+    kind = "latch"
+
+    def __init__(self) -> None:
+        super().__init__(Never())

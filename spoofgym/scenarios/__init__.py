@@ -6,11 +6,12 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.foi_drive import foi_drive
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.specification import build
 
-SCENARIOS: dict[str, Callable[..., Scenario]] = {"liu-flight": liu_flight, "recorded": recorded}
+SCENARIOS: dict[str, Callable[..., Scenario]] = {"foi-drive": foi_drive, "liu-flight": liu_flight, "recorded": recorded}
 
 
 @lru_cache(maxsize=32)

@@ -99,5 +99,6 @@ def liu_flight(
         horizon=horizon,
         drag_off_rate=(4.0, 4.0, 4.0),
         error_scale=10.0,
+        defender_scale=50.0,
         true_position_random_walk=FilterTuning().position_random_walk,
     )

@@ -284,6 +284,11 @@ class RecordedScenario(Scenario):
             )
         return self.first - burn_in
 
+    @property
+    def bias_sigma(self) -> Floats:
+        """Data-sheet bias of the IMU grade that the filter believes in, (6,), rad/s and m/s²."""
+        return np.hypot(self.grade.bias_sigma, self.grade.instability_sigma)
+
     def times(self, burn_in: int) -> Floats:
         """Log time of the epochs -burn_in..K, s."""
         return self.epoch_time[self._first(burn_in) : self.last + 1]

@@ -90,6 +90,18 @@ GRADES = {
             source="Liu et al. 2018, table 1 (aviation-grade INS)",
         ),
         ImuGrade(
+            name="fog",
+            gyro_bias=0.1,
+            gyro_random_walk=0.012,
+            gyro_instability=0.0,
+            accelerometer_bias=50.0,
+            accelerometer_random_walk=120.0,
+            accelerometer_instability=0.0,
+            correlation_time=3600.0,
+            source="KVH 1775 class (named by FOI-R-5687): data-sheet figures of its fibre-optic gyros and 10 g "
+            "accelerometers; biases stand for offset and instability",
+        ),
+        ImuGrade(
             name="tactical",
             gyro_bias=1.0,
             gyro_random_walk=0.1,

@@ -177,14 +177,14 @@ def test_the_name_builds_the_same_detector(specification):
 def test_make_detector_takes_objects():
     detector = Snapshot(p_fa=1e-3)
     assert make_detector(detector) is detector
-    assert set(DETECTORS) == {"snapshot", "windowed", "acna"}
+    assert {"snapshot", "windowed", "acna"} < set(DETECTORS)
     assert all(isinstance(make_detector(name), Detector) for name in DETECTORS)
 
 
 @pytest.mark.parametrize(
     ("specification", "message"),
     [
-        ("snapshoot", "unknown detector 'snapshoot'; valid names: acna, snapshot, windowed"),
+        ("snapshoot", "unknown detector 'snapshoot'; valid names: acna, bias-range, "),
         ("snapshot:window=3", "no option 'window'; valid options: threshold, p_fa, preset, arl0"),
         ("snapshot:0", "threshold must be a finite number greater than 0, got 0.0"),
         ("snapshot:nan", "threshold must be a finite number greater than 0, got nan"),
@@ -199,7 +199,8 @@ def test_make_detector_takes_objects():
         ("windowed:n=5,p_fa=1e-3,arl0=100", "at most one of threshold, p_fa, preset, arl0; got p_fa and arl0"),
         ("windowed:threshold=-1", "threshold must be a finite number greater than 0, got -1.0"),
         ("windowed:arl0=0.5", "arl0 must be a finite number greater than 1, got 0.5"),
-        ("windowed:preset=foi", "preset must be one of shadmehri, got 'foi'"),
+        ("windowed:preset=foi", "preset foi is for n = 6 and 21"),
+        ("windowed:preset=song", "preset must be one of shadmehri, foi, got 'song'"),
     ],
 )
 def test_bad_specifications_are_refused(specification, message):

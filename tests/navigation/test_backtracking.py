@@ -151,7 +151,8 @@ def test_a_reset_puts_the_position_on_the_fix_and_forgets_its_correlations(fidel
     before = simulation.navigator.error - simulation.epoch.innovation.residual
     variance = np.where(np.isin(np.arange(RUNS), runs), 25.0, 0.0)
     simulation.resolve(Decision(np.isin(np.arange(RUNS), runs), reset=variance))
-    np.testing.assert_allclose(simulation.error[runs], before[runs], rtol=0, atol=1e-4)  # the square of 90 m over the radius of the Earth
+    # the tolerance is the square of the error, 90 m, over the radius of the Earth
+    np.testing.assert_allclose(simulation.error[runs], before[runs], rtol=0, atol=1e-4)
     covariance = simulation.navigator.covariance[runs]
     np.testing.assert_array_equal(covariance[:, 6:9, 6:9], np.broadcast_to(25.0 * np.eye(3), (2, 3, 3)))
     np.testing.assert_array_equal(covariance[:, 6:9, :6], 0.0)
@@ -181,7 +182,7 @@ def test_a_noise_scale_is_an_update_with_that_much_larger_r(fidelity):
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_the_unaided_solution_does_not_move_with_the_filter(fidelity):
     """Whatever is decided, filter plus offset is the same solution: that of a run without any fix."""
-    never, _, coasting = play(lambda k: Decision(~ALL), fidelity, auxiliary=True)
+    _, _, coasting = play(lambda k: Decision(~ALL), fidelity, auxiliary=True)
     decisions = (lambda k: Decision(ALL), back_at(DEPTHS), back_at(DEPTHS, True))
     tolerance = 1e-9 if fidelity == "linear" else 0.02  # m; the offset is of first order
     for decide in decisions:

@@ -1,0 +1,111 @@
+"""Classical defenders: a detector and a response each, published ones and those tuned on the training attacks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from spoofgym.specification import Specification
+
+SEPARATOR = " > "
+WORLD_DETECTORS = (
+    "snapshot",
+    "windowed:n=5",
+    "windowed:n=20",
+    "signed-mean:n=5",
+    "signed-mean:n=10",
+    "relative-motion:k=20",
+)
+"""Run beside every defender of an evaluation, so that the same episode begins the same for all."""
+
+
+@dataclass(frozen=True)
+class ClassicalDefender:
+    """What watches, and what follows its alarm.
+
+    Attributes:
+        name: in reports.
+        detector: its specification.
+        response: its specification.
+        tuned: chosen on the training attacks; else published, or a yardstick.
+    """
+
+    name: str
+    detector: str
+    response: str
+    tuned: bool = False
+
+
+PUBLISHED = (
+    ClassicalDefender("snapshot", "snapshot", "exclude"),
+    ClassicalDefender("snapshot-latch", "snapshot", "latch"),
+    ClassicalDefender("foi-w5-b20", "windowed:n=5", "exclude-and-backtrack:20"),
+    ClassicalDefender("foi-w20-b20", "windowed:n=20", "exclude-and-backtrack:20"),
+    ClassicalDefender("foi-w5-b0", "windowed:n=5", "exclude"),
+    ClassicalDefender("foi-w20-b0", "windowed:n=20", "exclude"),
+    ClassicalDefender("foi-relative-b20", "relative-motion:k=20", "exclude-and-backtrack:20"),
+    ClassicalDefender("foi-constant-velocity", "windowed:n=5", "constant-velocity-start:20"),
+    ClassicalDefender("px4-auto", "snapshot", "px4-auto"),
+    ClassicalDefender("px4-dead-reckoning", "snapshot", "px4-dead-reckoning"),
+    ClassicalDefender("ardupilot-glitch", "snapshot", "ardupilot-glitch"),
+    ClassicalDefender("ardupilot-clip", "snapshot", "ardupilot-clip"),
+)
+"""The responses of the literature and of two autopilots, which follow their own gates instead of an alarm."""
+
+GRID_DETECTORS = ("windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
+GRID_DEPTHS = (0, 5, 10, 20, 50)
+GRID_REUSES = (0, 5)
+"""The grid that classical defenders are tuned on: detector x depth (or the estimated onset) x epochs until re-use."""
+
+
+TUNED = {
+    "foi-drive": [
+        ClassicalDefender(
+            "tuned-depth", "signed-mean:n=10", "exclude-and-backtrack:20,reuse=5", True
+        ),
+        ClassicalDefender("tuned-onset", "signed-mean:n=10", "onset-depth:reuse=5", True),
+    ],
+}
+"""The best of the grid on 4,000 games of each scenario's training attacks, as ``python -m train.tune`` finds them."""
+
+
+def grid() -> list[ClassicalDefender]:
+    """Every defender of the grid."""
+    result = []
+    for detector in GRID_DETECTORS:
+        for reuse in GRID_REUSES:
+            option = f"reuse={reuse}" if reuse else ""
+            for depth in GRID_DEPTHS:
+                response = with_depth(depth, option)
+                result.append(ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response, True))
+            response = "onset-depth" + (f":{option}" if option else "")
+            result.append(ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response, True))
+    return result
+
+
+def with_depth(depth: int, options: str = "") -> str:
+    """The response that excludes, and takes ``depth`` epochs back first; ``options`` are those of its re-use."""
+    if depth:
+        return f"exclude-and-backtrack:{depth}" + (f",{options}" if options else "")
+    return "exclude" + (f":{options}" if options else "")
+
+
+def tuned_for(scenario: str) -> list[ClassicalDefender]:
+    """The tuned defenders of a scenario: the best of a fixed depth, then the best that estimates the onset.
+
+    For a scenario that nobody has tuned them on they are those of the drive.
+    """
+    return TUNED.get(scenario, TUNED["foi-drive"])
+
+
+def parse(text: str) -> ClassicalDefender:
+    """The defender that ``detector > response`` spells.
+
+    Raises:
+        ValueError: the text is not of this form.
+    """
+    detector, separator, response = (part.strip() for part in text.partition(SEPARATOR.strip()))
+    if not separator or not detector or not response:
+        raise ValueError(f"a defender is spelled 'detector > response', e.g. 'snapshot > exclude', got {text!r}")
+    Specification.parse(detector)
+    Specification.parse(response)
+    return ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response)

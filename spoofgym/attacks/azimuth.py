@@ -1,0 +1,163 @@
+"""The azimuth attack of FOI-R-5687: the spoofed vehicle turns away slowly, turns back, and runs in parallel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from spoofgym import validation
+from spoofgym.arrays import Floats, Runs
+from spoofgym.attacks.base import Attack
+from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.specification import spell
+from spoofgym.streams import RunStreams
+
+DECAY = 45.0
+"""Length of the decay, s, where the attack lasts so long. The report's table leaves it out; with it the parallel run of
+its scenario 3 lasts the 40 s of which the report speaks."""
+
+
+def azimuth_error(since: Floats, azimuth: float, growth: float, decay: float) -> Floats:
+    """Error of the azimuth at times since the onset (n,), rad.
+
+    FOI-R-5687, chapter 4: exp(log(A + 1) i / N) - 1 while it grows, the same with (M - i) / (M - N) while it decays,
+    then zero. A is in radians: in degrees, as the tables give it, the report's own position errors do not come out.
+
+    Args:
+        since: time since the onset, s.
+        azimuth: A, rad.
+        growth: N, s.
+        decay: M - N, s.
+    """
+    left = np.where(since < growth, since / growth, 1.0 - (since - growth) / decay)
+    return np.expm1(np.log1p(azimuth) * np.clip(left, 0.0, 1.0))
+
+
+class Azimuth(Attack):
+    """The receiver is led along the true speed with a false azimuth (FOI-R-5687, chapter 4).
+
+    The spoofed position advances by the turned velocity of the coming epoch, p(i+1) = p(i) + v(i+1) Δt, from the true
+    position at the onset. This rectangle rule is the report's: in a turn of the vehicle it adds half an interval's
+    change of velocity to the offset, 10 m in 60 degrees at 20 m/s, and the report's figures have that in them. Its
+    horizontal speed is scaled by the vertical velocity, which is left out. The offset is zero again after the end.
+
+    Args:
+        azimuth: largest error, degrees clockwise.
+        growth: time until it is reached, s.
+        onset: scenario time of the last true fix, s; None = the start of the game.
+        end: scenario time of the last spoofed fix, s; None = the end of the game.
+        decay: time in which the error goes back to zero after that, s; less where the attack ends sooner.
+
+    Raises:
+        ValueError: an azimuth or a time that is not positive, or an end before the onset.
+    """
+
+    def __init__(
+        self,
+        azimuth: float,
+        growth: float = 10.0,
+        onset: float | None = None,
+        end: float | None = None,
+        decay: float = DECAY,
+    ) -> None:
+        self.azimuth = validation.above("azimuth", "azimuth", azimuth)
+        self.growth = validation.above("azimuth", "growth", growth)
+        self.decay = validation.above("azimuth", "decay", decay)
+        self.onset = None if onset is None else validation.finite("azimuth", "onset", onset)
+        self.end = None if end is None else validation.finite("azimuth", "end", end)
+        if self.end is not None and self.onset is not None and self.end <= self.onset:
+            raise ValueError(f"azimuth: end must be later than the onset at {self.onset:g} s, got {end!r}")
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this attack."""
+        return spell(
+            "azimuth",
+            self.azimuth,
+            growth=None if self.growth == 10.0 else self.growth,
+            onset=self.onset,
+            end=self.end,
+            decay=None if self.decay == DECAY else self.decay,
+        )
+
+    def bind(self, timeline: Timeline, num_runs: int) -> None:
+        """Fit the attack to a game; the offsets follow from the vehicle's velocity, which `follow` tells.
+
+        Raises:
+            ValueError: the attack starts before the game or after its end.
+        """
+        super().bind(timeline, num_runs)
+        self._offsets = np.zeros((timeline.num_epochs + 1, 3))
+
+    def follow(self, velocity: Floats) -> None:
+        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        timeline = self._timeline
+        times, interval = timeline.times, timeline.interval
+        end = timeline.end if self.end is None else self.end
+        since = times - self._onset
+        decay = max(min(self.decay, end - self._onset - self.growth), interval)
+        error = -azimuth_error(np.maximum(since, 0.0), np.radians(self.azimuth), self.growth, decay)
+        cosine, sine = np.cos(error), np.sin(error)
+        east, north = velocity[:, 0], velocity[:, 1]
+        turned = np.stack([cosine * east - sine * north, sine * east + cosine * north], axis=1)
+        inside = (since > 1e-9) & (times <= end + 1e-9)
+        travelled = 0.5 * (velocity[1:, :2] + velocity[:-1, :2])
+        steps = np.where(inside[1:, None], (turned[1:] - travelled) * interval, 0.0)
+        self._offsets[:] = 0.0
+        self._offsets[1:, :2] = np.cumsum(steps, axis=0)
+        self._offsets[~inside] = 0.0
+
+    def episode(self, runs: Runs, streams: RunStreams) -> Floats:
+        """The same offsets in every run and episode, (n, K+1, 3), m ENU."""
+        return np.broadcast_to(self._offsets, (len(runs), *self._offsets.shape))
+
+    def offset(self, clock: Clock) -> Floats:
+        """This epoch's offset, (N, 3), m ENU."""
+        return self._offsets[np.maximum(clock.index, 0)]
+
+
+FOI_SCENARIOS: dict[int, tuple[float, float, float, float]] = {
+    1: (95.0, 190.0, 10.0, 5.0),
+    2: (95.0, 190.0, 80.0, 5.0),
+    3: (95.0, 190.0, 10.0, 30.0),
+    4: (95.0, 190.0, 80.0, 30.0),
+    5: (95.0, 190.0, 10.0, 1.0),
+    6: (95.0, 190.0, 80.0, 1.0),
+    7: (125.0, 160.0, 10.0, 1.0),
+    8: (125.0, 160.0, 20.0, 1.0),
+}
+"""Start s, end s, growth s and azimuth deg of the report's scenarios (FOI-R-5687, tables 1 and 7)."""
+
+
+class FoiScenario(Azimuth):
+    """One of the eight attacks of FOI-R-5687, tables 1 and 7, on its drive.
+
+    Args:
+        number: 1 to 8.
+
+    Raises:
+        ValueError: there is no such scenario.
+    """
+
+    def __init__(self, number: int) -> None:
+        if number not in FOI_SCENARIOS:
+            raise ValueError(f"foi: number must be from 1 to {len(FOI_SCENARIOS)}, got {number!r}")
+        onset, end, growth, azimuth = FOI_SCENARIOS[number]
+        super().__init__(azimuth, growth, onset, end)
+        self.number = number
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this attack."""
+        return f"foi-{self.number}"
+
+
+def _scenario(number: int) -> Callable[[], Attack]:
+    def build() -> Attack:
+        return FoiScenario(number)
+
+    return build
+
+
+FOI_ATTACKS: dict[str, Callable[[], Attack]] = {f"foi-{number}": _scenario(number) for number in FOI_SCENARIOS}

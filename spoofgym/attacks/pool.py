@@ -1,0 +1,142 @@
+"""Populations of attacks, from which every run draws its opponent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spoofgym import validation
+from spoofgym.arrays import Floats, Runs
+from spoofgym.attacks.base import Attack
+from spoofgym.attacks.families import (
+    DEFAULT_MANOEUVRE,
+    ClimbingSpiral,
+    DecayingJump,
+    RandomGrowth,
+    RandomJump,
+    RandomRamp,
+    SignChangingRamp,
+    TwoStageRamp,
+)
+from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.specification import spell
+from spoofgym.streams import RunStreams
+
+CLEAN = -1
+"""Member of a run without an attack."""
+DEFAULT_CLEAN = 0.5
+
+
+class AttackPool(Attack):
+    """A weighted pool: at its reset each run draws an attack from it, or none.
+
+    Attributes:
+        names: of the members.
+        clean: share of runs without an attack.
+        offsets: of the present episodes, (N, K+1, 3), m ENU.
+        member: index of each run's opponent, (N,); -1 = none.
+        first: first epoch with an offset, (N,); K + 1 where there is none.
+        last: last epoch with an offset, (N,); 0 where there is none.
+    """
+
+    def __init__(
+        self, members: Sequence[tuple[Attack, float]], clean: float = DEFAULT_CLEAN, name: str | None = None
+    ) -> None:
+        """Draw from ``members``, attacks with their weights.
+
+        Raises:
+            ValueError: no member, two of one name, a weight that is not positive, or a share that is none.
+        """
+        if not members:
+            raise ValueError("a pool of attacks needs at least one member")
+        self.clean = validation.share("pool of attacks", "clean", clean)
+        self._members = [member for member, _ in members]
+        self.names = tuple(member.name for member in self._members)
+        if len(set(self.names)) < len(self.names):
+            raise ValueError(f"each attack can be in a pool once only, got {', '.join(self.names)}")
+        weights = np.array([validation.above("pool of attacks", "weight", weight) for _, weight in members])
+        self._bounds = np.cumsum(weights) / weights.sum()
+        self._name = " + ".join(self.names) if name is None else name
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this pool, or its members' names where none does."""
+        return self._name
+
+    def bind(self, timeline: Timeline, num_runs: int) -> None:
+        """Fit every member to a game and allocate the episodes.
+
+        Raises:
+            ValueError: an attack does not fit the game.
+        """
+        super().bind(timeline, num_runs)
+        for member in self._members:
+            member.bind(timeline, num_runs)
+        epochs = timeline.num_epochs + 1
+        self.offsets: Floats = np.zeros((num_runs, epochs, 3))
+        self.member: Runs = np.full(num_runs, CLEAN)
+        self.first, self.last = np.full(num_runs, epochs), np.zeros(num_runs, dtype=np.int64)
+        self._runs = np.arange(num_runs)
+
+    def follow(self, velocity: Floats) -> None:
+        """Tell every member the vehicle's true velocity at epochs 0..K, (K+1, 3), m/s."""
+        for member in self._members:
+            member.follow(velocity)
+
+    def reset(self, runs: Runs, streams: RunStreams) -> None:
+        """Draw the opponents of new episodes, and all that these will do."""
+        draws = np.array([streams(run, "opponent").random(2) for run in runs.tolist()])
+        member = np.minimum(np.searchsorted(self._bounds, draws[:, 1], side="right"), len(self._members) - 1)
+        self.member[runs] = np.where(draws[:, 0] < self.clean, CLEAN, member)
+        self.offsets[runs] = 0.0
+        for place, attack in enumerate(self._members):
+            chosen = runs[self.member[runs] == place]
+            if len(chosen):
+                self.offsets[chosen] = attack.episode(chosen, streams)
+        spoofed = np.any(self.offsets[runs], axis=2)
+        epochs = spoofed.shape[1]
+        self.first[runs] = np.where(np.any(spoofed, axis=1), spoofed.argmax(axis=1), epochs)
+        self.last[runs] = np.where(np.any(spoofed, axis=1), epochs - 1 - spoofed[:, ::-1].argmax(axis=1), 0)
+
+    def offset(self, clock: Clock) -> Floats:
+        """This epoch's offset, (N, 3), m ENU."""
+        return self.offsets[self._runs, np.maximum(clock.index, 0)]
+
+
+def training_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT_MANOEUVRE) -> AttackPool:
+    """The attacks that a defender is trained on: ramps, jumps, and FOI-R-5687's growth with a run in parallel.
+
+    Args:
+        clean: share of runs without an attack.
+        manoeuvre: share of attacks that begin in view of a manoeuvre.
+    """
+    families = (RandomRamp(manoeuvre), RandomJump(manoeuvre), RandomGrowth(manoeuvre))
+    return AttackPool([(family, 1.0) for family in families], clean, _spell("training", clean, manoeuvre))
+
+
+def held_out_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT_MANOEUVRE) -> AttackPool:
+    """Attacks of other shapes, rates and directions, which no defender is trained on.
+
+    Args:
+        clean: share of runs without an attack.
+        manoeuvre: share of attacks that begin in view of a manoeuvre.
+    """
+    families = (
+        TwoStageRamp(manoeuvre),
+        SignChangingRamp(manoeuvre),
+        DecayingJump(manoeuvre),
+        ClimbingSpiral(manoeuvre),
+    )
+    return AttackPool([(family, 1.0) for family in families], clean, _spell("held-out", clean, manoeuvre))
+
+
+def _spell(name: str, clean: float, manoeuvre: float) -> str:
+    return spell(
+        name,
+        clean=None if clean == DEFAULT_CLEAN else clean,
+        manoeuvre=None if manoeuvre == DEFAULT_MANOEUVRE else manoeuvre,
+    )
+
+
+POPULATIONS = {"training": training_population, "held-out": held_out_population}

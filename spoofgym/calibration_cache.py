@@ -1,0 +1,141 @@
+"""Results of calibration on disk, so that a program need not wait for clean runs that an earlier one has made.
+
+One JSON file per result, in ``$SPOOFGYM_CACHE``, else ``$XDG_CACHE_HOME/spoofgym``, else ``~/.cache/spoofgym``. Its
+name is a SHA-256 over everything that decides the result, the source of the simulation included: a result is used only
+by the code that made it. The folder can be deleted at any time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import os
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import spoofgym
+from spoofgym.detectors import DETECTORS, make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios import make_scenario
+
+SOURCES = (
+    *("sensors/*.py", "navigation/*.py", "detectors/*.py", "scenarios/*.py", "attacks/*.py"),
+    *("simulation.py", "scenario.py", "trajectory.py", "geodesy.py", "streams.py", "arrays.py"),
+    *("calibration.py", "clean_statistics.py", "first_alarms.py"),
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What calibration sets in a detector.
+
+    Attributes:
+        threshold: None where the detector has its own.
+        arl0: measured at the threshold, epochs.
+        slope: growth of the statistic along clean runs, per second; None where none is subtracted.
+    """
+
+    threshold: float | None = None
+    arl0: float | None = None
+    slope: float | None = None
+
+
+def _source() -> str:
+    """Digest of the source that decides a result; empty where there is none to read."""
+    package = Path(spoofgym.__file__).parent
+    digest = hashlib.sha256()
+    try:
+        for path in sorted(path for pattern in SOURCES for path in package.glob(pattern)):
+            digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    except OSError:
+        return ""
+    return digest.hexdigest()
+
+
+SOURCE = _source()
+"""Read when the program starts: a later edit of a file is not the code that runs."""
+
+
+def folder() -> Path | None:
+    """Where results lie; None where there is no such place."""
+    if given := os.environ.get("SPOOFGYM_CACHE"):
+        return Path(given)
+    if given := os.environ.get("XDG_CACHE_HOME"):
+        return Path(given) / "spoofgym"
+    try:
+        return Path.home() / ".cache" / "spoofgym"
+    except RuntimeError:
+        return None
+
+
+def key(*parts: str) -> str:
+    """Name of the result that these texts and the source decide."""
+    return hashlib.sha256(json.dumps([SOURCE, *parts]).encode()).hexdigest()
+
+
+def load(name: str) -> Setting | None:
+    """The result of this name; None where there is none, or its file is damaged."""
+    place = folder()
+    if place is None or not SOURCE:
+        return None
+    try:
+        setting = Setting(**json.loads((place / f"{name}.json").read_text(encoding="utf-8"))["setting"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    values = [value for value in dataclasses.astuple(setting) if value is not None]
+    sound = values and all(isinstance(value, float) and math.isfinite(value) for value in values)
+    return setting if sound and (setting.threshold is None or setting.threshold > 0.0) else None
+
+
+def store(name: str, setting: Setting, remark: str) -> None:
+    """Keep a result under its name, in one step; nothing happens where the folder cannot be written."""
+    place = folder()
+    if place is None or not SOURCE:
+        return
+    content = json.dumps({"what": remark, "setting": dataclasses.asdict(setting)}, indent=2) + "\n"
+    with suppress(OSError):
+        place.mkdir(parents=True, exist_ok=True)
+        handle, draft = tempfile.mkstemp(suffix=".draft", dir=place)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(content)
+            Path(draft).replace(place / f"{name}.json")
+        except OSError:
+            Path(draft).unlink(missing_ok=True)
+            raise
+
+
+def spelled_out(detector: Detector) -> bool:
+    """Whether the name of a detector builds another one like it."""
+    return type(detector) in DETECTORS.values() and type(make_detector(detector.name)) is type(detector)
+
+
+def spelled_out_scenario(scenario: Scenario) -> bool:
+    """Whether the name of a scenario builds another one like it."""
+    if not dataclasses.is_dataclass(scenario):
+        return False
+    try:
+        other = make_scenario(scenario.name)
+    except (ValueError, OSError):
+        return False
+    return _alike(scenario, other)
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two values are the same, field by field where they are data classes."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if dataclasses.is_dataclass(one):
+        names = (field.name for field in dataclasses.fields(one))
+        return all(_alike(getattr(one, name), getattr(other, name)) for name in names)
+    return bool(np.array_equal(one, other))

@@ -1,0 +1,112 @@
+"""Statistics of detectors on clean fixes: white innovations of a matched filter, or clean runs of a scenario."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.detectors.base import Detector
+from spoofgym.navigation.interface import Epoch, Innovation
+from spoofgym.scenario import Scenario
+from spoofgym.simulation import Simulation
+
+CleanStatistics = Callable[[Detector, int, np.random.Generator], tuple[Floats, Floats]]
+"""(detector, runs, randomness) -> its statistic in the burn-in (n, B) and in the clean epochs after it (n, K)."""
+
+JointStatistics = Callable[[Sequence[Detector], int, np.random.Generator], list[tuple[Floats, Floats]]]
+"""The same of several detectors on the same clean runs."""
+
+
+def white_statistics(factor: Floats, num_epochs: int) -> CleanStatistics:
+    """Statistics on the innovations of a matched filter, which are white: residual = L n.
+
+    Args:
+        factor: L, lower, (m, m).
+        num_epochs: K, of a run.
+    """
+    m = len(factor)
+
+    def statistics(detector: Detector, runs: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        detector.bind(runs, m)
+        covariance = np.broadcast_to(factor @ factor.T, (runs, m, m))
+        kept = np.empty((runs, detector.memory + num_epochs))
+        for k in range(kept.shape[1]):
+            whitened = rng.standard_normal((runs, m))
+            residual = np.einsum("nj,ij->ni", whitened, factor)
+            nis = np.einsum("nj,nj->n", whitened, whitened)
+            index = np.full(runs, k - detector.memory)
+            epoch = Epoch(index, index.astype(np.float64), Innovation(residual, covariance, whitened, nis))
+            kept[:, k] = detector.update(epoch)
+        return kept[:, : detector.memory], kept[:, detector.memory :]
+
+    return statistics
+
+
+class _BurnIn(Detector):
+    """A detector that never alarms, and keeps the highest statistic of each run before epoch 0 in ``peak``."""
+
+    threshold = math.inf
+
+    def __init__(self, detector: Detector) -> None:
+        self._detector = detector
+        self.memory = detector.memory
+        self.demands = detector.demands
+
+    @property
+    def name(self) -> str:
+        """That of the detector."""
+        return self._detector.name
+
+    def bind(self, num_runs: int, dimension: int) -> None:
+        """Allocate a memory of its own for the detector."""
+        self._detector = copy.copy(self._detector)
+        self._detector.bind(num_runs, dimension)
+        self.peak = np.full(num_runs, -math.inf)
+
+    def know(self, bias_sigma: Floats) -> None:
+        """Tell the detector."""
+        self._detector.know(bias_sigma)
+
+    def take(self, runs: Runs, other: Detector) -> None:
+        """Copy the peaks and what the detector remembers."""
+        assert isinstance(other, _BurnIn)
+        self.peak[runs] = other.peak
+        self._detector.take(runs, other._detector)
+
+    def update(self, epoch: Epoch) -> Floats:
+        """The detector's statistic, (N,)."""
+        statistic = self._detector.update(epoch)
+        self.peak = np.where(epoch.index < 0, np.maximum(self.peak, statistic), self.peak)
+        return statistic
+
+
+def joint_statistics(scenario: Scenario, fidelity: str, threads: int = 1) -> JointStatistics:
+    """Statistics of several detectors on common clean runs: the highest of the burn-in, all from epoch 0 on."""
+
+    def statistics(
+        detectors: Sequence[Detector], runs: int, rng: np.random.Generator
+    ) -> list[tuple[Floats, Floats]]:
+        watches = [_BurnIn(detector) for detector in detectors]
+        seed = int(rng.integers(2**31))
+        simulation = Simulation(scenario, None, watches, None, runs, seed, fidelity=fidelity, threads=threads)
+        kept = np.empty((len(watches), runs, scenario.timeline.num_epochs + 1))
+        epoch = simulation.reset()
+        for k in range(kept.shape[2]):
+            if k:
+                simulation.resolve()
+                epoch = simulation.observe()
+            for place, watch in enumerate(watches):
+                kept[place, :, k] = epoch.statistics[watch.name]
+        return [(watch.peak[:, None], values) for watch, values in zip(watches, kept, strict=True)]
+
+    return statistics
+
+
+def simulated_statistics(scenario: Scenario, fidelity: str, threads: int = 1) -> CleanStatistics:
+    """Statistics of one detector on clean runs of a scenario, as `joint_statistics` gives them of several."""
+    joint = joint_statistics(scenario, fidelity, threads)
+    return lambda detector, runs, rng: joint([detector], runs, rng)[0]

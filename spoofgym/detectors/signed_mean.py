@@ -1,0 +1,87 @@
+"""Chi-square test of the mean of the last whitened horizontal innovations, which keeps their signs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spoofgym import validation
+from spoofgym.arrays import Floats, Runs
+from spoofgym.detectors.base import Detector
+from spoofgym.detectors.chi_square import quantile
+from spoofgym.detectors.ring import Ring
+from spoofgym.navigation.interface import Epoch
+from spoofgym.specification import spell
+
+DEFAULT_WINDOW = 5
+DEFAULT_ARL0 = 1e3
+HORIZONTAL = 2
+"""Degrees of freedom: east and north."""
+
+
+class SignedMean(Detector):
+    """Alarm where the last n whitened horizontal innovations lean to one side: statistic |Σ w|² / n = n |mean w|².
+
+    The whitening factor L is lower triangular, so the first two components of w = L⁻¹ z are the east and north
+    innovation whitened by their own covariance, whatever the height and the velocity do. Under a matched filter
+    Σ w / √n is standard normal in two dimensions: the statistic is chi-square with 2 degrees of freedom at every epoch,
+    for any n. A constant bias b of w has the noncentrality n |b|² here, as in the sum of n nis, whose noise has m n
+    degrees of freedom instead of 2: that is why a slow drag-off shows here first. A bias that changes its sign within
+    the window cancels.
+
+    Epochs that have not come, and those without a fix, count as zero, so that the statistic is then smaller.
+
+    Windows overlap, so ARL0 is not 1 / P_FA: it is calibrated. With nothing given it is 1e3, a sensitive alarm for a
+    response that uses GNSS again as soon as it agrees; give ``arl0`` to compare with other detectors.
+
+    Args:
+        n: terms of the sum, epochs.
+        threshold: compared with the statistic, no unit.
+        p_fa: probability that the statistic of one epoch exceeds the threshold; ``arl0`` then stays unknown.
+        arl0: average run length between false alarms, epochs.
+
+    Raises:
+        ValueError: more than one of the last three is given, or a value is out of range.
+    """
+
+    def __init__(
+        self,
+        n: int = DEFAULT_WINDOW,
+        threshold: float | None = None,
+        p_fa: float | None = None,
+        arl0: float | None = None,
+    ) -> None:
+        self.n = validation.whole("signed-mean", "n", n, 1)
+        self.memory = self.n - 1
+        validation.at_most_one("signed-mean", threshold=threshold, p_fa=p_fa, arl0=arl0)
+        if threshold is not None:
+            self.threshold = validation.above("signed-mean", "threshold", threshold)
+        elif p_fa is not None:
+            self.threshold = quantile(validation.probability("signed-mean", "p_fa", p_fa), HORIZONTAL)
+        else:
+            self.target_arl0 = validation.above("signed-mean", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
+        self._name = spell(
+            "signed-mean",
+            n=None if self.n == DEFAULT_WINDOW else self.n,
+            threshold=None if threshold is None else self.threshold,
+            p_fa=p_fa,
+            arl0=None if self.target_arl0 == DEFAULT_ARL0 else self.target_arl0,
+        )
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this detector."""
+        return self._name
+
+    def bind(self, num_runs: int, dimension: int) -> None:
+        """Allocate the window."""
+        self._ring = Ring(num_runs, self.n, HORIZONTAL)
+
+    def reset(self, runs: Runs) -> None:
+        """Empty the windows of these runs."""
+        self._ring.reset(runs)
+
+    def update(self, epoch: Epoch) -> Floats:
+        """|Σ w|² / n, (N,), added up anew at every epoch so that no rounding error accumulates."""
+        self._ring.push(epoch.innovation.whitened[:, :HORIZONTAL])
+        total = np.add.reduce(self._ring.values, axis=1)
+        return np.asarray((total[:, 0] ** 2 + total[:, 1] ** 2) / self.n)

@@ -1,0 +1,169 @@
+"""Defender-v0: the single environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from spoofgym.envs.config import DefenderConfig, configure
+from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.defender_rendering import DefenderFigure
+from spoofgym.envs.single import SingleEnv
+
+
+class DefenderEnv(SingleEnv):
+    r"""The defender's game: when to leave GNSS out, from how far back, and when to trust it again.
+
+    ## Description
+
+    A vehicle navigates by an inertial navigation system and GNSS fixes, which an error-state Kalman filter fuses. At
+    some time, perhaps, a spoofer moves the fixes; the receiver may also lose them for a while, or suffer multipath. At
+    every fix (an epoch) the defender, the agent, uses it or excludes it. Where it begins to exclude, it may also take
+    back fixes that were used before: the filter returns to its state of n epochs ago and is recomputed to the present
+    by inertial measurements alone. Without GNSS the estimate drifts, so that excluding too much costs as much as being
+    spoofed; taking back too little leaves spoofed fixes in the estimate and, with the covariance that they have
+    shrunk, may keep true GNSS out for good; taking back too much gives good fixes away.
+
+    The default scenario is a drive after FOI-R-5687: 230 epochs from 20 s on, 20 m/s, two turns, a fibre-optic IMU.
+    Each game draws its opponent from a population of attacks, or has none.
+
+    ```python
+    import gymnasium
+
+    env = gymnasium.make("spoofgym:spoofgym/Defender-v0", scenario="foi-drive", render_mode="rgb_array")
+    ```
+
+    ## Action Space
+
+    `MultiDiscrete([2, D])`.
+
+    - First: 0 = use the fix of the present epoch, 1 = exclude it. A fix that the receiver does not give is never used.
+    - Second: place in the scenario's depth table, (0, 5, 10, 20, 50) epochs by default (D = 5). It is read only where
+      the last decision was to use and this one is to exclude, and it is the number of epochs before the present one
+      whose fixes are taken back. A backtrack no deeper than the present coast does nothing, for there is no fix to take
+      back; one deeper than the history is cut. Both are told in `info`.
+
+    ## Observation Space
+
+    `Box(float32)` with the entries below. A quantity x with a scale is squashed to y / (1 + |y|), y = x / scale; those
+    that are "not squashed" lie in [0, 1]. The table is that of the default arguments: fixes of position, four
+    detectors.
+
+    | Index | Name | Unit | Scale |
+    |---|---|---|---|
+    | 0 | whitened innovation east | sigma | 2 |
+    | 1 | whitened innovation north | sigma | 2 |
+    | 2 | whitened innovation up | sigma | 2 |
+    | 3 | statistic of snapshot over its threshold | 1 | 1 |
+    | 4 | statistic of windowed:n=5 over its threshold | 1 | 1 |
+    | 5 | statistic of windowed over its threshold | 1 | 1 |
+    | 6 | statistic of relative-motion over its threshold | 1 | 1 |
+    | 7 | signed mean of 5 epochs east | sigma | 2 |
+    | 8 | signed mean of 5 epochs north | sigma | 2 |
+    | 9 | signed mean of 10 epochs east | sigma | 2 |
+    | 10 | signed mean of 10 epochs north | sigma | 2 |
+    | 11 | innovation east | m | 10 |
+    | 12 | innovation north | m | 10 |
+    | 13 | change of the innovation east | m | 10 |
+    | 14 | change of the innovation north | m | 10 |
+    | 15 | onset estimate, epochs back | epochs | 20 |
+    | 16 | score of the onset estimate | 1 | 20 |
+    | 17 | suspicion | 1 | not squashed |
+    | 18 | quiet epochs in a row | epochs | 5 |
+    | 19 | GNSS available | 1 | not squashed |
+    | 20 | last decision was to exclude | 1 | not squashed |
+    | 21 | coasting time | s | 20 |
+    | 22 | predicted position sigma | m | 10 |
+    | 23 | speed | m/s | 50 |
+    | 24 | acceleration | m/s² | 1 |
+    | 25 | gyro bias right over its data sheet | 1 | 1 |
+    | 26 | gyro bias forward over its data sheet | 1 | 1 |
+    | 27 | gyro bias up over its data sheet | 1 | 1 |
+    | 28 | accelerometer bias right over its data sheet | 1 | 1 |
+    | 29 | accelerometer bias forward over its data sheet | 1 | 1 |
+    | 30 | accelerometer bias up over its data sheet | 1 | 1 |
+    | 31 | elapsed fraction of the game | 1 | not squashed |
+
+    - Signed means are those of the whitened horizontal innovations, times the root of their number, so that each axis
+      is standard normal where the filter is matched and nobody attacks. The score of the onset estimate is the largest
+      |sum of the last n|² / n, n up to 50, and the estimate is that n (`spoofgym.responses.onset`).
+    - Suspicion rises when the squared signed mean of 5 epochs exceeds its 1e-3 quantile (chi-square, 2 degrees of
+      freedom) and is dropped after 5 quiet epochs in a row, whose NIS lies below its own 1e-3 quantile.
+    - Estimates of velocity, position sigma and biases are the filter's own, before the fix of the epoch. The scale of
+      what is measured in metres is the scenario's `defender_scale`.
+    - In an outage the innovations are zero, and nothing but the last decision tells a coast by choice.
+
+    `env.unwrapped.game.fields` gives the list of an environment.
+
+    ## Rewards
+
+    After each decision the error of the estimate, the horizontal norm of estimate minus truth, is scored in real time:
+    recomputing past epochs does not mend what was put out then. The reward is the sum of two terms, which
+    `info["reward_terms"]` holds:
+
+    - `error`: minus the error over `error_scale`, at most `error_clip`.
+    - `exclusion`: minus `exclusion_cost` where the decision was to exclude a clean fix: one that the receiver gives,
+      not spoofed and without multipath.
+
+    `info["error"]` and `info["mean_error"]` are not clipped: report those.
+
+    ## Starting State
+
+    The filter is warm, as in Spoofer-v0, and detectors remember a clean stretch without an alarm. `reset` ends after
+    the clean epoch 0, on which the first action decides. The opponent, its onset and the receiver's disturbances are
+    drawn at `reset`, from streams of their own. `reset` has no options.
+
+    ## Episode End
+
+    - Terminated: at the last epoch of the scenario (230 steps on the drive). Its fix is observed, not decided on.
+    - Truncated: never by itself. `gymnasium.make(..., max_episode_steps=...)` sets a shorter limit.
+
+    ## Information
+
+    - `epoch`: the present epoch, 0 after `reset`.
+    - `error`: horizontal error of the estimate when last resolved, m. For scores only: no defender knows it.
+    - `alarm`: whether a detector alarms in the present epoch (steps only, as all that follow).
+    - `used`: whether the last fix was used.
+    - `coast`: epochs since a fix was last used.
+    - `backtrack_asked`: epochs that the action asked to take back; 0 where its depth was not read.
+    - `backtrack`: epochs whose fixes were taken back: less than asked where the history is shorter, 0 where the coast
+      was as long.
+    - `reward_terms`: `error` and `exclusion`.
+    - `mean_error`: mean of the error over the game, m (last step only).
+
+    For training only: `env.unwrapped.game.privileged()` gives what a critic may know and no defender (the true error
+    and the schedule of the attack); it is no part of the observation.
+
+    ## Arguments
+
+    | Name | Default | Meaning |
+    |---|---|---|
+    | `scenario` | `"foi-drive"` | specification `name[:value][,key=value...]`, or a `Scenario` |
+    | `attacks` | `"training"` | a population ("training", "held-out"), an attack, or a tuple of attacks |
+    | `detectors` | see the table above | specification or `Detector`, or a tuple of them |
+    | `fidelity` | `"linear"` | "linear" (error states, one step per fix) or "strapdown" (IMU rate) |
+    | `clean` | `0.5` | share of games without an attack |
+    | `outage` | `0.15` | share of games in which the receiver loses GNSS for 10 to 40 s |
+    | `multipath` | `0.15` | share of games with a burst of multipath, 3 to 8 m for 10 to 20 s |
+    | `error_scale` | `None` | metres of error that cost 1; None = the scenario's (10 m drive, 50 m flight) |
+    | `error_clip` | `5.0` | largest cost of the error in a step |
+    | `exclusion_cost` | `0.05` | of a clean fix left out |
+    | `threads` | `1` | threads for slices of lanes; results do not depend on it |
+    | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
+
+    ## Vectorized environment
+
+    `gymnasium.make_vec("spoofgym:spoofgym/Defender-v0", num_envs=64)` builds the native `DefenderVectorEnv`, which
+    takes the same arguments but `render_mode`, and `autoreset_mode`. Lane i is bit-identical to the single environment
+    seeded `seed + i`, for any number of lanes. `spoofgym.envs.sb3.SB3VecEnv` adapts it to Stable-Baselines3.
+
+    ## Version History
+
+    - v0: first release.
+    """
+
+    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
+        """Set the game up; ``arguments`` are those of the environment's page."""
+        self._check_render_mode(render_mode)
+        self.config = configure(DefenderConfig, arguments)
+        game = DefenderGame(self.config, 1)
+        super().__init__(game, render_mode, DefenderFigure(game) if render_mode == "rgb_array" else None)

@@ -1,0 +1,241 @@
+"""What the defender sees: the fields of its observation, and the memory that they need."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.detectors.chi_square import quantile
+from spoofgym.envs.observation import AXES, Field, Squash
+from spoofgym.responses.onset import OnsetEstimator
+from spoofgym.scenario import Scenario
+from spoofgym.simulation import Simulation
+
+SHORT, LONG = 5, 10
+"""Epochs of the signed means."""
+QUIET_P = 1e-3
+"""An epoch is quiet whose NIS, or whose signed mean, is exceeded with a greater probability under a matched filter."""
+QUIET_EPOCHS = 5
+"""Quiet epochs in a row after which a suspicion is dropped."""
+
+
+def defender_fields(
+    dimension: int, detectors: tuple[str, ...], error_scale: float
+) -> tuple[Field, ...]:
+    """The entries of the defender's observation, in order.
+
+    Args:
+        dimension: m, of the fix.
+        detectors: their names.
+        error_scale: metres of error that make a reward of -1.
+    """
+    axes = [f"{kind}{axis}" for kind in ("", "velocity ")[: dimension // 3] for axis in AXES]
+    result = [Field(f"whitened innovation {axis}", "sigma", 2.0) for axis in axes]
+    result += [Field(f"statistic of {name} over its threshold", "1", 1.0) for name in detectors]
+    for epochs in (SHORT, LONG):
+        result += [Field(f"signed mean of {epochs} epochs {axis}", "sigma", 2.0) for axis in AXES[:2]]
+    result += [Field(f"innovation {axis}", "m", error_scale) for axis in AXES[:2]]
+    result += [Field(f"change of the innovation {axis}", "m", error_scale) for axis in AXES[:2]]
+    result += [
+        Field("onset estimate, epochs back", "epochs", 20.0),
+        Field("score of the onset estimate", "1", 20.0),
+        Field("suspicion", "1", 0.0),
+        Field("quiet epochs in a row", "epochs", 5.0),
+        Field("GNSS available", "1", 0.0),
+        Field("last decision was to exclude", "1", 0.0),
+        Field("coasting time", "s", 20.0),
+        Field("predicted position sigma", "m", error_scale),
+        Field("speed", "m/s", 50.0),
+        Field("acceleration", "m/s²", 1.0),
+    ]
+    for sensor in ("gyro", "accelerometer"):
+        result += [Field(f"{sensor} bias {axis} over its data sheet", "1", 1.0) for axis in ("right", "forward", "up")]
+    result.append(Field("elapsed fraction of the game", "1", 0.0))
+    return tuple(result)
+
+
+class DefenderFeatures:
+    """The observations of N lanes.
+
+    Attributes:
+        fields: the entries, in order.
+    """
+
+    def __init__(
+        self, scenario: Scenario, simulation: Simulation, detectors: Sequence[str], num_lanes: int
+    ) -> None:
+        """Allocate the memory of ``num_lanes`` lanes, which see the ``detectors`` of these names."""
+        self._simulation = simulation
+        self.fields = defender_fields(scenario.dimension, tuple(detectors), scenario.defender_scale)
+        self._detectors = tuple(detectors)
+        self._thresholds = np.array([simulation.detectors[name].threshold for name in detectors])
+        self._onset = OnsetEstimator(num_lanes)
+        self._means = np.zeros((num_lanes, LONG, 2))
+        self._residual = np.zeros((num_lanes, 2))
+        self._velocity = np.zeros((num_lanes, 3))
+        self._suspicion = np.zeros(num_lanes, dtype=bool)
+        self._quiet = np.zeros(num_lanes, dtype=np.int64)
+        self._raw = np.zeros((num_lanes, len(self.fields)))
+        self._quiet_nis, self._quiet_mean = quantile(QUIET_P, scenario.dimension), quantile(QUIET_P, 2)
+        self._interval, self._horizon = scenario.timeline.interval, scenario.timeline.num_epochs
+        self._bias_sigma = scenario.bias_sigma
+        self._squash = Squash(self.fields)
+
+    def reset(self, lanes: Runs) -> None:
+        """Forget the games of these lanes."""
+        self._onset.reset(lanes)
+        self._means[lanes], self._residual[lanes], self._velocity[lanes] = 0.0, 0.0, np.nan
+        self._suspicion[lanes], self._quiet[lanes] = False, 0
+
+    def update(self, excluding: Flags, coast: Runs, lanes: Runs) -> None:
+        """See the present epoch of these lanes.
+
+        Args:
+            excluding: whether the last decision was to exclude, (N,).
+            coast: epochs since a fix was last used, (N,).
+            lanes: which.
+        """
+        epoch = self._simulation.epoch
+        assert epoch.available is not None
+        assert epoch.view is not None
+        self._onset.push(epoch.innovation.whitened[:, :2], lanes)
+        depth, score = self._onset.estimate()
+        statistics = np.empty((len(coast), len(self._thresholds)))
+        for place, name in enumerate(self._detectors):
+            statistics[:, place] = epoch.statistics[name]
+        _fill(
+            lanes,
+            epoch.index,
+            epoch.innovation.whitened,
+            epoch.innovation.residual,
+            epoch.innovation.nis,
+            epoch.available,
+            statistics,
+            self._thresholds,
+            depth,
+            score,
+            excluding,
+            np.asarray(coast * self._interval, dtype=np.float64),
+            epoch.view.position_covariance,
+            epoch.view.velocity,
+            epoch.view.estimated_bias,
+            self._bias_sigma,
+            self._interval,
+            self._horizon,
+            self._quiet_nis,
+            self._quiet_mean,
+            self._means,
+            self._residual,
+            self._velocity,
+            self._suspicion,
+            self._quiet,
+            self._raw,
+        )
+
+    def observation(self) -> NDArray[np.float32]:
+        """What each lane's defender sees, (N, D)."""
+        return self._squash(self._raw)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill(
+    lanes: Runs,
+    index: Runs,
+    whitened: Floats,
+    residual: Floats,
+    nis: Floats,
+    available: Flags,
+    statistics: Floats,
+    thresholds: Floats,
+    depth: Runs,
+    score: Floats,
+    excluding: Flags,
+    coast: Floats,
+    covariance: Floats,
+    velocity: Floats,
+    bias: Floats,
+    bias_sigma: Floats,
+    interval: float,
+    horizon: int,
+    quiet_nis: float,
+    quiet_mean: float,
+    means: Floats,
+    last_residual: Floats,
+    last_velocity: Floats,
+    suspicion: Any,
+    quiet: Runs,
+    raw: Floats,
+) -> None:
+    """Write the raw entries of lanes, in the order of `defender_fields`, and keep what the next epoch compares with."""
+    m = whitened.shape[1]
+    for lane in lanes:
+        row = raw[lane]
+        place = 0
+        for a in range(m):
+            row[place + a] = whitened[lane, a]
+        place += m
+        for d in range(len(thresholds)):
+            row[place + d] = statistics[lane, d] / thresholds[d]
+        place += len(thresholds)
+        square = _signed_means(means[lane], index[lane], whitened[lane], row[place : place + 4])
+        place += 4
+        for a in range(2):
+            row[place + a] = residual[lane, a]
+            change = residual[lane, a] - last_residual[lane, a]
+            row[place + 2 + a] = change if available[lane] and index[lane] > 0 else 0.0
+            if available[lane]:
+                last_residual[lane, a] = residual[lane, a]
+        place += 4
+        if available[lane]:
+            quiet[lane] = quiet[lane] + 1 if nis[lane] < quiet_nis else 0
+        if square > quiet_mean:
+            suspicion[lane] = True
+        elif quiet[lane] >= QUIET_EPOCHS:
+            suspicion[lane] = False
+        row[place] = depth[lane]
+        row[place + 1] = score[lane]
+        row[place + 2] = 1.0 if suspicion[lane] else 0.0
+        row[place + 3] = quiet[lane]
+        row[place + 4] = 1.0 if available[lane] else 0.0
+        row[place + 5] = 1.0 if excluding[lane] else 0.0
+        row[place + 6] = coast[lane]
+        row[place + 7] = np.sqrt(covariance[lane, 0, 0] + covariance[lane, 1, 1])
+        speed = 0.0
+        change = 0.0
+        for a in range(3):
+            speed += velocity[lane, a] ** 2
+            if index[lane] > 0:
+                change += (velocity[lane, a] - last_velocity[lane, a]) ** 2
+            last_velocity[lane, a] = velocity[lane, a]
+        row[place + 8] = np.sqrt(speed)
+        row[place + 9] = np.sqrt(change) / interval
+        place += 10
+        for a in range(6):
+            row[place + a] = bias[lane, a] / bias_sigma[a]
+        row[place + 6] = index[lane] / horizon
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _signed_means(ring: Floats, index: int, whitened: Floats, row: Floats) -> float:
+    """Put the newest horizontal innovation into its ring (10, 2) and write √n times the means of 5 and 10 epochs, (4,).
+
+    Returns:
+        The square of the shorter one, chi-square with 2 degrees of freedom under a matched filter.
+    """
+    for a in range(2):
+        ring[index % LONG, a] = whitened[a]
+        short = 0.0
+        long = 0.0
+        for back in range(LONG):
+            value = ring[(index - back) % LONG, a]
+            long += value
+            if back < SHORT:
+                short += value
+        row[a] = short / np.sqrt(SHORT)
+        row[2 + a] = long / np.sqrt(LONG)
+    return row[0] ** 2 + row[1] ** 2

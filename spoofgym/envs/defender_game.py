@@ -1,0 +1,231 @@
+"""The defender's game on N lanes: what the single and the vector environment have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.attacks import opponents
+from spoofgym.calibration import calibrated_all
+from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.defender_features import DefenderFeatures
+from spoofgym.envs.observation import observation_space
+from spoofgym.envs.privileged import PrivilegedState
+from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.scenarios import make_scenario
+from spoofgym.sensors.confounders import Confounders, Disturbances
+from spoofgym.simulation import Simulation
+
+USE, EXCLUDE = 0, 1
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one step of N lanes gave.
+
+    Attributes:
+        error: reward for the error of the estimate, (N,).
+        exclusion: reward for leaving clean GNSS out, (N,).
+        backtrack_asked: epochs that the action asked to take back, (N,); 0 where its depth was not read.
+        backtrack: epochs whose fixes were taken back, (N,).
+        used: whether the fix was used, (N,).
+        terminated: the game is over, (N,).
+    """
+
+    error: Floats
+    exclusion: Floats
+    backtrack_asked: Runs
+    backtrack: Runs
+    used: Flags
+    terminated: Flags
+
+    @property
+    def reward(self) -> Floats:
+        """The sum of the reward terms, (N,)."""
+        return self.error + self.exclusion
+
+
+class DefenderGame:
+    """N lanes of the defender's game.
+
+    Attributes:
+        config: its arguments.
+        scenario: what is played on.
+        simulation: the world.
+        attacks: the population from which each lane draws its opponent.
+        confounders: the receiver's outages and multipath.
+        privileged: called, it gives what a critic may know in training and no defender ever, (N, P).
+        depths: the depth table, (D,), epochs.
+        error: horizontal error of the estimate when last resolved, (N,), m.
+        coast: epochs since a fix was last used, (N,).
+        excluding: whether the last decision was to exclude, (N,).
+    """
+
+    def __init__(self, config: DefenderConfig, num_lanes: int, beside: Sequence[Detector] = ()) -> None:
+        """Set the game up.
+
+        Args:
+            config: its arguments.
+            num_lanes: N.
+            beside: detectors, with their thresholds, among which are all of the game's own: the simulation runs these,
+                the defender sees its own.
+
+        Raises:
+            ValueError: a part that is unknown or does not fit the scenario.
+        """
+        self.config = config
+        scenario = self.scenario = make_scenario(config.scenario)
+        given = config.detectors if isinstance(config.detectors, tuple | list) else (config.detectors,)
+        # copies: an object that the caller gives to two environments must not carry memories from one to the other
+        detectors = [deepcopy(make_detector(part)) for part in given]
+        if not beside:
+            detectors = calibrated_all(detectors, scenario)
+        names = [detector.name for detector in detectors]
+        if len(set(names)) < len(names):
+            raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
+        running = [deepcopy(detector) for detector in beside] or detectors
+        missing = set(names) - {detector.name for detector in running}
+        if missing:
+            raise ValueError(f"detectors of the game are not among those beside it: {', '.join(sorted(missing))}")
+        self.num_lanes = num_lanes
+        self.depths: Runs = np.array(scenario.depth_table, dtype=np.int64)
+        self.attacks = opponents(config.attacks, config.clean)
+        self.confounders = Confounders(Disturbances(outage_share=config.outage, multipath_share=config.multipath))
+        self.simulation = Simulation(
+            scenario,
+            self.attacks,
+            running,
+            None,
+            num_lanes,
+            fidelity=config.fidelity,
+            threads=config.threads,
+            demands=Demands(excludes=True, history=int(self.depths.max())),
+            confounders=self.confounders,
+        )
+        self.features = DefenderFeatures(scenario, self.simulation, names, num_lanes)
+        self.privileged = PrivilegedState(
+            self.simulation, self.attacks, self.confounders, scenario.defender_scale
+        )
+        self.fields = self.features.fields
+        self.observation_space = observation_space(self.fields)
+        self.action_space = spaces.MultiDiscrete([2, len(self.depths)])
+        self.error = np.zeros(num_lanes)
+        self.coast = np.zeros(num_lanes, dtype=np.int64)
+        self.excluding = np.zeros(num_lanes, dtype=bool)
+        self._scale = config.error_scale or scenario.defender_scale
+        self._horizon = scenario.timeline.num_epochs
+        self._total_error = np.zeros(num_lanes)
+        self._all = np.arange(num_lanes)
+
+    @property
+    def index(self) -> Runs:
+        """Epoch of each lane, (N,)."""
+        return self.simulation.epoch.index
+
+    def reset(self, lanes: Runs) -> None:
+        """Start new games up to the clean epoch 0."""
+        self.simulation.reset(lanes)
+        self._begin(lanes)
+        self.features.update(self.excluding, self.coast, lanes)
+
+    def _begin(self, lanes: Runs) -> None:
+        self.error[lanes] = self._horizontal()[lanes]
+        self.coast[lanes] = 0
+        self.excluding[lanes] = False
+        self._total_error[lanes] = 0.0
+        self.features.reset(lanes)
+
+    def _horizontal(self) -> Floats:
+        """Horizontal error of the estimate, (N,), m."""
+        error = self.simulation.error
+        return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
+
+    def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> Outcome:
+        """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action.
+
+        Args:
+            actions: (N, 2): 0 = use or 1 = exclude, and the place of the depth in the table.
+            restarting: indices of lanes.
+
+        Raises:
+            ValueError: an action lies outside the action space, or the actions have the wrong shape.
+        """
+        actions = self._check(actions)
+        exclude = actions[:, 0] == EXCLUDE
+        asked = np.where(exclude & ~self.excluding, self.depths[actions[:, 1]], 0)
+        backtrack = np.where(asked > self.coast, asked, 0)
+        simulation = self.simulation
+        simulation.resolve(Decision(~exclude, backtrack if backtrack.any() else None))
+        taken_back, used = simulation.navigator.backtracked.copy(), simulation.used.copy()
+        self.excluding = exclude
+        self.coast = np.where(used, 0, self.coast + 1)
+        self.error = self._horizontal()
+        self._total_error += self.error
+        error = -np.minimum(self.error / self._scale, self.config.error_clip)
+        exclusion = np.where(exclude & self.clean, -self.config.exclusion_cost, 0.0)
+        if restarting is not None and len(restarting):
+            simulation.restart(restarting)
+        simulation.observe()
+        if restarting is not None and len(restarting):
+            self._begin(restarting)
+        self.features.update(self.excluding, self.coast, self._all)
+        return Outcome(error, exclusion, asked, taken_back, used, self.index == self._horizon)
+
+    def _check(self, actions: NDArray[Any]) -> Runs:
+        given = np.asarray(actions)
+        if given.shape != (self.num_lanes, 2):
+            raise ValueError(f"actions must have shape ({self.num_lanes}, 2), got {given.shape}")
+        whole = given.astype(np.int64)
+        wrong = (whole != given) | (whole < 0) | (whole >= self.action_space.nvec)
+        if wrong.any():
+            lane = int(np.flatnonzero(wrong.any(axis=1))[0])
+            raise ValueError(
+                f"action of lane {lane} must be whole numbers, [0 or 1, 0 to {len(self.depths) - 1}], got {given[lane]}"
+            )
+        return whole
+
+    @property
+    def attacked(self) -> Flags:
+        """Whether the present fix is spoofed, (N,)."""
+        return np.asarray(self.simulation.offset.any(axis=1))
+
+    @property
+    def clean(self) -> Flags:
+        """Whether there is a present fix, neither spoofed nor disturbed by multipath, (N,)."""
+        available = self.simulation.epoch.available
+        assert available is not None
+        return available & ~self.attacked & ~self.confounders.multipath[self._all, self.index]
+
+    def observation(self) -> NDArray[np.float32]:
+        """What each lane's defender sees, (N, D)."""
+        return self.features.observation()
+
+    def reset_values(self) -> dict[str, Any]:
+        """Infos after a reset, of all lanes."""
+        return {"epoch": self.index, "error": self.error}
+
+    def step_values(self, outcome: Outcome) -> dict[str, Any]:
+        """Infos after a step, of all lanes."""
+        return {
+            "epoch": self.index,
+            "error": self.error,
+            "alarm": self.simulation.alarm,
+            "used": outcome.used,
+            "coast": self.coast,
+            "backtrack_asked": outcome.backtrack_asked,
+            "backtrack": outcome.backtrack,
+            "reward_terms": {"error": outcome.error, "exclusion": outcome.exclusion},
+        }
+
+    def end_values(self, outcome: Outcome) -> dict[str, Any]:
+        """Infos of games that are over."""
+        return {"mean_error": self._total_error / self._horizon}

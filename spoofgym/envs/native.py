@@ -1,0 +1,260 @@
+"""What the native vector environments have in common: seeds, autoreset modes, infos in Gymnasium's layout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.simulation import Simulation
+
+Observations = NDArray[np.float32]
+Values = dict[str, Any]
+"""Infos of all lanes: arrays (N,), or a dictionary of them."""
+
+
+class AnyOutcome(Protocol):
+    """What one step of N lanes gave, at least."""
+
+    @property
+    def reward(self) -> Floats:
+        """Of the step, (N,)."""
+
+    @property
+    def terminated(self) -> Flags:
+        """The game is over, (N,)."""
+
+
+class Game(Protocol):
+    """N lanes of a game, from one player's seat."""
+
+    simulation: Simulation
+    observation_space: spaces.Box
+
+    @property
+    def action_space(self) -> spaces.Space[Any]:
+        """Of one lane."""
+
+    @property
+    def index(self) -> Runs:
+        """Epoch of each lane, (N,)."""
+
+    def reset(self, lanes: Runs) -> None:
+        """Start new games, up to the clean epoch 0."""
+
+    def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> Any:
+        """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action."""
+
+    def observation(self) -> Observations:
+        """What each lane's player sees, (N, D)."""
+
+    def reset_values(self) -> Values:
+        """Infos after a reset."""
+
+    def step_values(self, outcome: Any) -> Values:
+        """Infos after a step."""
+
+    def end_values(self, outcome: Any) -> Values:
+        """Infos of a game that is over, beside those of its last step."""
+
+
+class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
+    """N lanes of a game, each bit-identical to the single environment seeded ``seed + i``.
+
+    Observations, rewards, ends and infos are those of a `gymnasium.vector.SyncVectorEnv` of single environments, in all
+    three autoreset modes. Lanes do not depend on their number nor on ``threads``.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(
+        self,
+        game: Game,
+        num_envs: int,
+        autoreset_mode: AutoresetMode | str,
+        max_episode_steps: int | None,
+    ) -> None:
+        """Take a game of ``num_envs`` lanes."""
+        self.num_envs = num_envs
+        self.game: Any = game
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = None
+        self.single_observation_space = game.observation_space
+        self.single_action_space = game.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._max_episode_steps = max_episode_steps
+        self._all = np.arange(num_envs)
+        self._done = np.zeros(num_envs, dtype=bool)
+        self._started = np.zeros(num_envs, dtype=bool)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start new games.
+
+        Args:
+            seed: lane i is seeded ``seed + i``; or a sequence with a seed (or None) per lane; None = the streams go on.
+            options: ``{"reset_mask": bool (N,)}`` resets those lanes only.
+
+        Raises:
+            ValueError: a sequence of seeds of the wrong length, or a mask of the wrong shape or without any lane.
+            TypeError: a mask that is not a boolean array.
+        """
+        mask = self._reset_mask(options)
+        lanes = np.flatnonzero(mask)
+        seeds: Sequence[int | None]
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
+        for lane in lanes:
+            if seeds[lane] is not None or self._generators[lane] is None:
+                generator, _ = seeding.np_random(seeds[lane])
+                self._generators[lane] = generator
+                self.game.simulation.streams.replace(int(lane), generator)
+        self.game.reset(lanes)
+        self._done[lanes] = False
+        self._started[lanes] = True
+        return self.game.observation(), self._reset_info(mask)
+
+    def _reset_mask(self, options: dict[str, Any] | None) -> Flags:
+        if options is None or "reset_mask" not in options:
+            return np.ones(self.num_envs, dtype=bool)
+        mask = options["reset_mask"]
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+            raise TypeError(f"options['reset_mask'] must be a boolean array, got {mask!r}")
+        if mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(
+                f"options['reset_mask'] must have shape ({self.num_envs},) and at least one True, got {mask!r}"
+            )
+        return mask
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+        """One GNSS epoch of every lane.
+
+        Raises:
+            ValueError: the actions have the wrong shape or are not finite.
+            RuntimeError: a lane has never been reset or, where the autoreset mode is DISABLED, its game is over.
+        """
+        if not self._started.all():
+            lanes = np.flatnonzero(~self._started).tolist()
+            raise RuntimeError(f"the game of lanes {lanes} has not begun: call reset() first")
+        if self.autoreset_mode == AutoresetMode.NEXT_STEP:
+            return self._step_then_reset(actions)
+        if self._done.any():
+            lanes = np.flatnonzero(self._done).tolist()
+            raise RuntimeError(
+                f"the game of lanes {lanes} is over: reset them first, with options={{'reset_mask': ...}}"
+            )
+        outcome, truncated = self._play(actions, None)
+        done = outcome.terminated | truncated
+        if self.autoreset_mode == AutoresetMode.DISABLED or not done.any():
+            self._done = done & (self.autoreset_mode == AutoresetMode.DISABLED)
+            info = self._step_info(outcome, np.ones(self.num_envs, dtype=bool))
+            return self.game.observation(), outcome.reward, outcome.terminated, truncated, info
+        return self._reset_in_step(outcome, truncated, done)
+
+    def _play(self, actions: NDArray[Any], restarting: Runs | None) -> tuple[Any, Flags]:
+        outcome = self.game.step(actions, restarting)
+        truncated = np.zeros(self.num_envs, dtype=bool)
+        if self._max_episode_steps is not None:
+            truncated = self.game.index >= self._max_episode_steps
+        return outcome, truncated
+
+    def _step_then_reset(
+        self, actions: NDArray[Any]
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+        """NEXT_STEP: the step after a lane's end begins its new game, with no reward."""
+        restarted = self._done
+        outcome, truncated = self._play(actions, np.flatnonzero(restarted))
+        reward = np.where(restarted, 0.0, outcome.reward)
+        terminated, truncated = outcome.terminated & ~restarted, truncated & ~restarted
+        info = {} if restarted.all() else self._step_info(outcome, ~restarted)
+        if restarted.any():
+            _fill(info, self._reset_info(restarted), restarted)
+        self._done = terminated | truncated
+        return self.game.observation(), reward, terminated, truncated, info
+
+    def _reset_in_step(
+        self, outcome: AnyOutcome, truncated: Flags, done: Flags
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+        """SAME_STEP: the observation is that of the new game, the old one's end is in the info."""
+        final = self.game.observation()
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for lane in np.flatnonzero(done):
+            final_obs[lane] = final[lane]
+        final_info = self._step_info(outcome, done)
+        info = {} if done.all() else self._step_info(outcome, ~done)
+        self.game.reset(np.flatnonzero(done))
+        _fill(info, self._reset_info(done), done)
+        info |= {
+            "final_obs": final_obs,
+            "_final_obs": done.copy(),
+            "final_info": final_info,
+            "_final_info": done.copy(),
+        }
+        return self.game.observation(), outcome.reward, outcome.terminated, truncated, info
+
+    def _reset_info(self, mask: Flags) -> dict[str, Any]:
+        return _masked(self.game.reset_values(), mask)
+
+    def _step_info(self, outcome: AnyOutcome, mask: Flags) -> dict[str, Any]:
+        """The single environment's infos in Gymnasium's layout: arrays, each with its mask."""
+        info = _masked(self.game.step_values(outcome), mask)
+        over = outcome.terminated & mask
+        if over.any():
+            info |= _masked(self.game.end_values(outcome), over)
+        return info
+
+
+def _masked(values: Values, mask: Flags) -> dict[str, Any]:
+    """Each array with zeros (None for objects) where the mask is False, and the mask beside it."""
+    everyone = bool(mask.all())
+    info: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, dict):
+            info[key] = _masked(value, mask)
+        elif everyone:
+            info[key] = value.copy()
+        else:
+            absent = None if value.dtype == object else np.zeros((), dtype=value.dtype)
+            info[key] = np.where(mask, value, absent)
+        info[f"_{key}"] = mask.copy()
+    return info
+
+
+def _fill(info: dict[str, Any], part: dict[str, Any], mask: Flags) -> None:
+    """Put the entries of the lanes in ``mask`` beside those of the others."""
+    for key, value in part.items():
+        if key in info:
+            info[key][mask] = value[mask]
+        else:
+            info[key] = value
+
+
+def check_arguments(num_envs: int, max_episode_steps: int | None, render_mode: str | None) -> None:
+    """Refuse what no native vector environment takes.
+
+    Raises:
+        ValueError: an argument out of range, or a render mode, which only the single environment has.
+    """
+    if num_envs < 1:
+        raise ValueError(f"num_envs must be 1 or more, got {num_envs}")
+    if render_mode is not None:
+        raise ValueError(f"the vector environment draws nothing: render_mode must be None, got {render_mode!r}")
+    if max_episode_steps is not None and max_episode_steps < 1:
+        raise ValueError(f"max_episode_steps must be 1 or more, got {max_episode_steps}")

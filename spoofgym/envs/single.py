@@ -1,0 +1,106 @@
+"""What the single environments have in common: one lane of a game."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from spoofgym.envs.native import Game, Values
+
+LANE = np.zeros(1, dtype=np.int64)
+
+
+class Figure(Protocol):
+    """Records lane 0 of a game and draws it."""
+
+    def restart(self) -> None:
+        """Forget the last game and record epoch 0 of the new one."""
+
+    def record(self) -> None:
+        """Keep the present epoch."""
+
+    def draw(self) -> NDArray[np.uint8]:
+        """The figure so far, (H, W, 3)."""
+
+    def close(self) -> None:
+        """Free what was drawn."""
+
+
+class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
+    """One lane of a game."""
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+    def __init__(self, game: Game, render_mode: str | None, figure: Figure | None) -> None:
+        """Take a game of one lane."""
+        self.game: Any = game
+        self.observation_space = game.observation_space  # type: ignore[assignment]
+        self.action_space = game.action_space
+        self.render_mode = render_mode
+        self._figure = figure
+        self._streamed: np.random.Generator | None = None
+        self._playing = False
+
+    @classmethod
+    def _check_render_mode(cls, render_mode: str | None) -> None:
+        if render_mode is not None and render_mode not in cls.metadata["render_modes"]:
+            raise ValueError(f"unknown render_mode {render_mode!r}; valid modes: {cls.metadata['render_modes']}")
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start a new game; there are no options."""
+        super().reset(seed=seed)
+        if self.np_random is not self._streamed:
+            self.game.simulation.streams.replace(0, self.np_random)
+            self._streamed = self.np_random
+        self.game.reset(LANE)
+        self._playing = True
+        if self._figure is not None:
+            self._figure.restart()
+        return self.game.observation()[0], _only_lane(self.game.reset_values())
+
+    def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """One GNSS epoch.
+
+        Raises:
+            ValueError: the action has the wrong shape, or lies outside the action space where that is discrete.
+            RuntimeError: the game is over or has not been started.
+        """
+        if not self._playing:
+            raise RuntimeError("the game is over: call reset() first")
+        action = np.asarray(action)
+        if action.shape != self.action_space.shape:
+            raise ValueError(f"the action must have shape {self.action_space.shape}, got {action.shape}")
+        outcome = self.game.step(action[None])
+        terminated = bool(outcome.terminated[0])
+        self._playing = not terminated
+        if self._figure is not None:
+            self._figure.record()
+        info = _only_lane(self.game.step_values(outcome))
+        if terminated:
+            info |= _only_lane(self.game.end_values(outcome))
+        return self.game.observation()[0], float(outcome.reward[0]), terminated, False, info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The figure of the game so far, (H, W, 3); None without a render mode."""
+        return None if self._figure is None else self._figure.draw()
+
+    def close(self) -> None:
+        """Free the figure."""
+        if self._figure is not None:
+            self._figure.close()
+
+
+def _only_lane(values: Values) -> dict[str, Any]:
+    """Infos of the only lane as plain Python values."""
+    info: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, dict):
+            info[key] = _only_lane(value)
+        else:
+            info[key] = value[0] if value.dtype == object else value[0].item()
+    return info

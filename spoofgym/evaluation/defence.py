@@ -1,0 +1,286 @@
+"""Whole games of a defender, and what came of each: the same episodes for every defender."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.attacks import opponents
+from spoofgym.attacks.pool import AttackPool
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
+from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.responses.base import Response
+from spoofgym.responses.watching import Watching
+from spoofgym.scenario import Scenario
+from spoofgym.sensors.confounders import Confounders, Disturbances
+from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
+
+BATCH = 1000
+
+
+@dataclass(frozen=True)
+class DefenceEpisodes:
+    """What came of n games of K decisions.
+
+    Attributes:
+        error: horizontal error of the real-time output after each decision, (n, K), m.
+        excluded: the decision was to exclude, (n, K).
+        available: the receiver gave a fix, (n, K).
+        attacked: the fix was spoofed, (n, K).
+        clean: there was a fix, neither spoofed nor disturbed by multipath, (n, K).
+        member: the opponent, an index into ``names``, (n,); -1 = none.
+        names: of the opponents.
+        interval: between epochs, s.
+    """
+
+    error: Floats
+    excluded: Flags
+    available: Flags
+    attacked: Flags
+    clean: Flags
+    member: Runs
+    names: tuple[str, ...]
+    interval: float
+
+    def of(self, games: Any) -> DefenceEpisodes:
+        """Some of the games."""
+        parts = ("error", "excluded", "available", "attacked", "clean", "member")
+        return replace(self, **{name: getattr(self, name)[games] for name in parts})
+
+
+@dataclass(frozen=True)
+class World:
+    """What every defender is evaluated in.
+
+    All of ``detectors`` run beside every defender, whether it looks at them or not: how an episode begins depends on
+    them (a burn-in without an alarm), and the same episode is to begin the same for all.
+
+    Attributes:
+        scenario: of the game.
+        attacks: a population or an attack, by its specification.
+        clean: share of games without an attack.
+        detectors: with their thresholds.
+        disturbances: of the receiver.
+        fidelity: of the simulation.
+        threads: of the simulation.
+    """
+
+    scenario: Scenario
+    attacks: str
+    clean: float
+    detectors: tuple[Detector, ...]
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    fidelity: str = "linear"
+    threads: int = 1
+
+    def simulation(
+        self, response: Response | None, episodes: int, seed: int, demands: Demands
+    ) -> Simulation:
+        """A simulation of some episodes, the first of which is seeded ``seed``."""
+        return Simulation(
+            self.scenario,
+            opponents(self.attacks, self.clean),
+            list(self.detectors),
+            response,
+            episodes,
+            seed,
+            fidelity=self.fidelity,
+            threads=self.threads,
+            demands=demands,
+            confounders=Confounders(self.disturbances),
+        )
+
+
+def _batches(episodes: int) -> Iterator[tuple[int, int]]:
+    """First episode and number of episodes of each batch."""
+    if episodes < 1:
+        raise ValueError(f"episodes must be 1 or more, got {episodes}")
+    for first in range(0, episodes, BATCH):
+        yield first, min(BATCH, episodes - first)
+
+
+def play_response(world: World, detector: str, response: Response, episodes: int, seed: int) -> DefenceEpisodes:
+    """Games of a classical defender.
+
+    Args:
+        world: what is played in.
+        detector: name of the one whose alarm the response follows.
+        response: what follows an alarm.
+        episodes: how many games; game i is seeded ``seed + i``, whoever defends.
+        seed: of game 0.
+
+    Raises:
+        ValueError: the world has no such detector.
+    """
+    def decide(simulation: Simulation) -> Flags:
+        excluded = ~simulation.decision.use
+        simulation.resolve()
+        return excluded
+
+    watching = Watching(response, detector, world.detectors)
+    return _play(world, watching, decide, watching.demands, episodes, seed)
+
+
+def play_never(world: World, episodes: int, seed: int) -> DefenceEpisodes:
+    """Games of a defender that uses every fix."""
+
+    def decide(simulation: Simulation) -> Flags:
+        simulation.resolve()
+        return np.zeros(simulation.num_runs, dtype=bool)
+
+    return _play(world, None, decide, Demands(), episodes, seed)
+
+
+def play_always(world: World, episodes: int, seed: int) -> DefenceEpisodes:
+    """Games of a defender that excludes every fix."""
+
+    def decide(simulation: Simulation) -> Flags:
+        nobody = np.zeros(simulation.num_runs, dtype=bool)
+        simulation.resolve(Decision(nobody))
+        return ~nobody
+
+    return _play(world, None, decide, Demands(excludes=True), episodes, seed)
+
+
+def play_oracle_onset(world: World, episodes: int, seed: int) -> DefenceEpisodes:
+    """Games of a defender that knows when fixes are spoofed, and leaves out just these."""
+
+    def decide(simulation: Simulation) -> Flags:
+        spoofed = np.asarray(simulation.offset.any(axis=1))
+        simulation.resolve(Decision(~spoofed))
+        return spoofed
+
+    return _play(world, None, decide, Demands(excludes=True), episodes, seed)
+
+
+def play_random(world: World, episodes: int, seed: int) -> DefenceEpisodes:
+    """Games of a defender that tosses a coin at every epoch, and a depth where it begins to exclude."""
+    depths = np.array(world.scenario.depth_table)
+    rng = np.random.default_rng(np.random.SeedSequence((seed, 1)))
+    before = np.zeros(0, dtype=bool)
+
+    def decide(simulation: Simulation) -> Flags:
+        nonlocal before
+        n = simulation.num_runs
+        if len(before) != n or not simulation.epoch.index.any():
+            before = np.zeros(n, dtype=bool)
+        exclude = rng.random(n) < 0.5
+        depth = np.where(exclude & ~before, depths[rng.integers(len(depths), size=n)], 0)
+        before = exclude
+        simulation.resolve(Decision(~exclude, depth))
+        return exclude
+
+    return _play(world, None, decide, Demands(excludes=True, history=int(depths.max())), episodes, seed)
+
+
+def _play(
+    world: World,
+    response: Response | None,
+    decide: Callable[[Simulation], Flags],
+    demands: Demands,
+    episodes: int,
+    seed: int,
+) -> DefenceEpisodes:
+    parts = []
+    for first, count in _batches(episodes):
+        simulation = world.simulation(response, count, seed + first, demands)
+        simulation.reset()
+        record = _Record(simulation)
+        for k in range(world.scenario.timeline.num_epochs):
+            if k:
+                simulation.observe()
+            record.see(simulation, k)
+            record.excluded[:, k] = decide(simulation)
+            record.error[:, k] = horizontal(simulation.error)
+        parts.append(record.episodes(simulation))
+    return _join(parts)
+
+
+def play_policy(
+    world: World,
+    config: DefenderConfig,
+    act: Callable[[NDArray[np.float32]], NDArray[np.int64]],
+    episodes: int,
+    seed: int,
+) -> DefenceEpisodes:
+    """Games of a learned policy, which meet the noise that a response would.
+
+    Args:
+        world: what is played in.
+        config: of the game that the policy was trained on: what it observes.
+        act: actions for observations (N, D), (N, 2).
+        episodes: how many games; game i is seeded ``seed + i``.
+        seed: of game 0.
+    """
+    config = replace(
+        config,
+        scenario=world.scenario,
+        attacks=world.attacks,
+        clean=world.clean,
+        fidelity=world.fidelity,
+        outage=world.disturbances.outage_share,
+        multipath=world.disturbances.multipath_share,
+        threads=world.threads,
+    )
+    parts = []
+    for first, count in _batches(episodes):
+        game = DefenderGame(config, count, world.detectors)
+        game.simulation.streams = RunStreams.from_seed(seed + first, count)
+        game.reset(np.arange(count))
+        record = _Record(game.simulation)
+        for k in range(world.scenario.timeline.num_epochs):
+            record.see(game.simulation, k)
+            actions = act(game.observation())
+            record.excluded[:, k] = actions[:, 0] == EXCLUDE
+            game.step(actions)
+            record.error[:, k] = game.error
+        parts.append(record.episodes(game.simulation))
+    return _join(parts)
+
+
+class _Record:
+    """What is noted of a batch of games while it is played."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        shape = (simulation.num_runs, simulation.scenario.timeline.num_epochs)
+        self.error = np.zeros(shape)
+        self.excluded, self.available, self.attacked, self.multipath = (np.zeros(shape, dtype=bool) for _ in range(4))
+
+    def see(self, simulation: Simulation, k: int) -> None:
+        """Note the present epoch before it is decided on."""
+        assert simulation.epoch.available is not None
+        assert simulation.confounders is not None
+        self.available[:, k] = simulation.epoch.available
+        self.attacked[:, k] = simulation.offset.any(axis=1)
+        self.multipath[:, k] = simulation.confounders.multipath[:, k]
+
+    def episodes(self, simulation: Simulation) -> DefenceEpisodes:
+        """All games of the batch."""
+        attack = simulation.attack
+        assert isinstance(attack, AttackPool)
+        clean = self.available & ~self.attacked & ~self.multipath
+        return DefenceEpisodes(
+            self.error,
+            self.excluded,
+            self.available,
+            self.attacked,
+            clean,
+            attack.member.copy(),
+            tuple(attack.names),
+            simulation.scenario.timeline.interval,
+        )
+
+
+def _join(parts: list[DefenceEpisodes]) -> DefenceEpisodes:
+    names = ("error", "excluded", "available", "attacked", "clean", "member")
+    joined: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[0], **joined)

@@ -1,0 +1,57 @@
+"""A response that follows one detector among several."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+
+from spoofgym.arrays import Flags, Runs
+from spoofgym.detectors.base import Detector
+from spoofgym.navigation.interface import Decision, Epoch
+from spoofgym.responses.base import Response
+
+
+class Watching(Response):
+    """Hands a response the alarm of one detector instead of that of any.
+
+    Several detectors can then run in one simulation, and each defender follows its own.
+    """
+
+    def __init__(self, response: Response, detector: str, detectors: Sequence[Detector]) -> None:
+        """Let ``response`` follow the one of ``detectors`` that is called ``detector``.
+
+        Raises:
+            ValueError: there is none of that name, or it has no threshold.
+        """
+        found = [item for item in detectors if item.name == detector]
+        if not found:
+            raise ValueError(f"no detector {detector!r}; there are: {', '.join(item.name for item in detectors)}")
+        if found[0].threshold is None:
+            raise ValueError(f"detector {detector!r} has no threshold yet: calibrate it first")
+        self._response = response
+        self._detector = detector
+        self._threshold = found[0].threshold
+        self.demands = response.demands
+
+    @property
+    def name(self) -> str:
+        """Detector and response; no specification builds it."""
+        return f"{self._detector} > {self._response.name}"
+
+    def bind(self, num_runs: int) -> None:
+        """Allocate the memory of ``num_runs`` runs, in a copy of the response."""
+        self._response = copy.copy(self._response)
+        self._response.bind(num_runs)
+
+    def reset(self, runs: Runs) -> None:
+        """Forget everything about these runs."""
+        self._response.reset(runs)
+
+    def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
+        """The response's decision on the alarm of the one detector."""
+        return self._response.decide(epoch, epoch.statistics[self._detector] > self._threshold)
+
+    def take(self, runs: Runs, other: Response) -> None:
+        """Copy the memory of a copy bound to fewer runs."""
+        assert isinstance(other, Watching)
+        self._response.take(runs, other._response)

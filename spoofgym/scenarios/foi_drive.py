@@ -1,0 +1,116 @@
+"""The drive of FOI-R-5687: 250 s at 20 m/s with two turns, a fibre-optic IMU and a receiver that doubts itself.
+
+The report simulates a KVH 1775 and records a receiver in the loop of a GNSS simulator. Speed, duration and the times of
+the turns follow it. It gives neither the rates of the sensors nor the filter's initial uncertainty and process noise.
+Ours are the rates (50 and 1 Hz), the place, the angles of the turns (-60 degrees each, which fit its attack errors
+best), the shapes of the manoeuvres, and a start that is levelled to 20 arcseconds with a heading known to 180: the
+report's tests let the INS run free from a well aligned start. The lag of the receiver's own filter, an eighth of a
+second, is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from spoofgym import validation
+from spoofgym.navigation.tuning import FilterTuning
+from spoofgym.scenario import SimulatedScenario
+from spoofgym.sensors.imu import grade
+from spoofgym.sensors.receiver import Receiver
+from spoofgym.specification import spell
+from spoofgym.trajectory import Accelerate, Straight, Trajectory, Turn, fly
+
+FOI_START = (math.radians(58.41), math.radians(15.62), 60.0)
+"""Near Linköping: latitude rad, longitude rad, height m."""
+
+CREEP = 0.01
+"""Speed of the vehicle while it stands still in the report, m/s: a heading needs a velocity."""
+
+FOI_MANOEUVRES = (
+    Straight(10.0),
+    Accelerate(20.0 - CREEP, 10.0),
+    Straight(90.0),
+    Turn(math.radians(-60.0), 10.0),
+    Straight(45.0),
+    Turn(math.radians(-60.0), 10.0),
+    Straight(75.0),
+)
+"""Still to 10 s, 20 m/s from 20 s on, turns begin at 110 and 165 s, end at 250 s."""
+
+STANDSTILL = 0.01
+"""Initial uncertainty of the velocity, m/s: the filter begins on a vehicle that stands still."""
+
+RECEIVERS = ("white", "foi")
+
+
+@lru_cache(maxsize=1)
+def foi_trajectory() -> Trajectory:
+    """True motion of the drive, 12,500 IMU steps at 50 Hz, of which the first 500 creep."""
+    return fly(FOI_MANOEUVRES, position=FOI_START, speed=CREEP, heading=math.radians(90.0), rate=50.0)
+
+
+def foi_drive(
+    horizon: int = 230,
+    onset: float = 20.0,
+    imu: str = "fog",
+    receiver: str = "white",
+    process_noise: float = 1.0,
+    bias_states: bool = True,
+) -> SimulatedScenario:
+    """The drive as a game from 20 s to 250 s.
+
+    With the receiver ``white`` its error is white, 1 m per axis, and the filter's R is just that: the filter is
+    matched, and detectors have the false-alarm rates that theory gives. With ``foi`` the error is small and slow
+    (Gauss-Markov, 0.6 m and 60 s, and 0.1 m white) while R is (3 m)², as the report's receiver over-states its
+    covariance: tests of the innovation are then nearly deaf at thresholds of theory, and the report sets them by
+    experience.
+
+    Args:
+        horizon: epochs of the game.
+        onset: time of the last clean fix, s.
+        imu: name of the IMU grade.
+        receiver: ``white`` or ``foi``.
+        process_noise: factor on the variance of the filter's inertial process noise. The report does not give it, and
+            it decides whether GNSS is ever used again after an attack.
+        bias_states: whether the filter estimates the IMU's biases; the report's has nine states.
+
+    Raises:
+        ValueError: an unknown IMU or receiver, a factor that is not positive, or a game outside the drive.
+    """
+    validation.one_of("foi-drive", "receiver", receiver, RECEIVERS)
+    white = receiver == "white"
+    sigma = (1.0, 1.0, 1.0) if white else (3.0, 3.0, 3.0)
+    return SimulatedScenario(
+        name=spell(
+            "foi-drive",
+            horizon=None if horizon == 230 else horizon,
+            onset=None if onset == 20.0 else onset,
+            imu=None if imu == "fog" else imu,
+            receiver=None if white else receiver,
+            process_noise=None if process_noise == 1.0 else process_noise,
+            bias_states=None if bias_states else bias_states,
+        ),
+        trajectory=foi_trajectory(),
+        grade=grade(imu),
+        receiver=Receiver(
+            white_sigma=(1.0, 1.0, 1.0) if white else (0.1, 0.1, 0.1),
+            markov_sigma=(0.0, 0.0, 0.0) if white else (0.6, 0.6, 0.6),
+            markov_time=0.0 if white else 60.0,
+        ),
+        tuning=FilterTuning(
+            velocity_sigma=(STANDSTILL, STANDSTILL, STANDSTILL),
+            position_sigma=sigma,
+            initial_scale=1.0,
+            position_random_walk=0.0,
+            process_noise_scale=validation.above("foi-drive", "process_noise", process_noise),
+            measurement_sigma=sigma,
+            bias_states=bias_states,
+        ),
+        onset=onset,
+        horizon=horizon,
+        drag_off_rate=(4.0, 4.0, 4.0),
+        error_scale=10.0,
+        defender_scale=10.0,
+        true_position_random_walk=0.0,
+    )

@@ -1,0 +1,167 @@
+"""PPO for the defender: a critic that knows the truth, an actor that does not, and what a run leaves behind.
+
+The returns are heavy-tailed: a few games in which spoofed fixes stay in the estimate carry the mean. A critic that sees
+the true error and the schedule of the attack explains most of that, so that the advantages of the actor's decisions
+stand out. Both see one vector; the actor's network is given its first part only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+from torch import nn
+
+from agents.learned import LearnedDefender
+from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.sb3 import SB3VecEnv
+from spoofgym.envs.vector import DefenderVectorEnv
+from train.ppo import LAST_RATE, arrays
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Settings of the learner.
+
+    Attributes:
+        lanes: games played at once.
+        clean: share of games without an attack in training.
+        minibatches: of a rollout, which is one whole game of every lane.
+        epochs: passes over a rollout.
+        learning_rate: at the start; falls linearly to almost zero at the last step.
+        gamma: discount per epoch.
+        gae_lambda: of the advantage estimate.
+        clip_range: of the policy ratio.
+        entropy: weight of the policy's entropy at the start; falls with the learning rate's schedule by the clip only.
+        hidden: width of the two hidden layers of policy and value.
+        privileged: whether the critic sees the privileged state.
+        validation_episodes: games of the training attacks on which checkpoints are compared.
+    """
+
+    lanes: int = 256
+    clean: float = 0.1
+    minibatches: int = 8
+    epochs: int = 6
+    learning_rate: float = 1.5e-3
+    gamma: float = 0.99
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    entropy: float = 0.0
+    hidden: int = 64
+    privileged: bool = True
+    validation_episodes: int = 4000
+
+
+class PrivilegedVecEnv(SB3VecEnv):
+    """The defender's lanes with the privileged state behind each observation."""
+
+    def __init__(self, vector_env: DefenderVectorEnv) -> None:
+        """Widen the observations of ``vector_env``."""
+        super().__init__(vector_env)
+        width = len(vector_env.game.fields) + len(vector_env.game.privileged.fields)
+        self.observation_space = spaces.Box(-1.0, 1.0, (width,), np.float32)
+
+    def _widen(self, observation: Any) -> NDArray[np.float32]:
+        return np.concatenate([observation, self.vector_env.game.privileged()], axis=1)  # type: ignore[attr-defined]
+
+    def reset(self) -> VecEnvObs:
+        """Start new episodes in all lanes."""
+        return self._widen(super().reset())
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """One step of all lanes; games end by termination only: nobody asks for the value of their last state."""
+        observation, reward, done, infos = super().step_wait()
+        return self._widen(observation), reward, done, infos
+
+
+class SlicedNetworks(nn.Module):
+    """Two tanh networks: the policy's sees the first ``width`` entries, the value's all of them."""
+
+    def __init__(self, width: int, whole: int, hidden: int) -> None:
+        super().__init__()
+        self.latent_dim_pi = self.latent_dim_vf = hidden
+        self.width = width
+        self.policy_net = _tanh_network(width, hidden)
+        self.value_net = _tanh_network(whole, hidden)
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Latents of both."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        """Latent of the policy."""
+        return self.policy_net(features[:, : self.width])
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        """Latent of the value."""
+        return self.value_net(features)
+
+
+def _tanh_network(inputs: int, hidden: int) -> nn.Sequential:
+    return nn.Sequential(nn.Linear(inputs, hidden), nn.Tanh(), nn.Linear(hidden, hidden), nn.Tanh())
+
+
+class SlicedPolicy(ActorCriticPolicy):
+    """An actor that sees the first ``width`` entries of the observation, and a critic that sees all."""
+
+    def __init__(self, *args: Any, width: int, hidden: int, **kwargs: Any) -> None:
+        self._width, self._hidden = width, hidden
+        super().__init__(*args, **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor: Any = SlicedNetworks(self._width, self.features_dim, self._hidden)
+
+
+def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: Path) -> PPO:
+    """A PPO learner on ``settings.lanes`` lanes of the game, seeded; TensorBoard writes into ``folder``."""
+    trained = replace(config, clean=settings.clean)
+    vector = DefenderVectorEnv(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(trained))
+    horizon = vector.game.scenario.timeline.num_epochs
+    adapted = PrivilegedVecEnv(vector) if settings.privileged else SB3VecEnv(vector)
+    return PPO(
+        SlicedPolicy,
+        VecMonitor(adapted),
+        n_steps=horizon,
+        batch_size=max(1, settings.lanes * horizon // settings.minibatches),
+        n_epochs=settings.epochs,
+        learning_rate=lambda remaining: settings.learning_rate * max(remaining, LAST_RATE),
+        gamma=settings.gamma,
+        gae_lambda=settings.gae_lambda,
+        clip_range=settings.clip_range,
+        ent_coef=settings.entropy,
+        policy_kwargs={"width": len(vector.game.fields), "hidden": settings.hidden},
+        tensorboard_log=str(folder / "tensorboard"),
+        seed=seed,
+        device="cpu",
+    )
+
+
+def export(learner: PPO, config: DefenderConfig, folder: Path) -> LearnedDefender:
+    """The learner's policy as plain arrays."""
+    layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
+    vector: DefenderVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
+    layout = tuple(field.name for field in vector.game.fields)
+    return LearnedDefender(folder.resolve().name, config, layout, *arrays(layers))
+
+
+def environment_arguments(config: DefenderConfig) -> dict[str, Any]:
+    """The arguments that rebuild the environment, for ``config.json``.
+
+    Raises:
+        ValueError: a part that has no specification.
+    """
+    arguments = asdict(config)
+    texts = [arguments["scenario"], arguments["attacks"], *arguments["detectors"]]
+    if not all(isinstance(text, str) for text in texts):
+        raise ValueError("a training run needs scenario, attacks and detectors by their specifications")
+    return arguments
