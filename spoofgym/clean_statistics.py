@@ -87,9 +87,7 @@ class _BurnIn(Detector):
 def joint_statistics(scenario: Scenario, fidelity: str, threads: int = 1) -> JointStatistics:
     """Statistics of several detectors on common clean runs: the highest of the burn-in, all from epoch 0 on."""
 
-    def statistics(
-        detectors: Sequence[Detector], runs: int, rng: np.random.Generator
-    ) -> list[tuple[Floats, Floats]]:
+    def statistics(detectors: Sequence[Detector], runs: int, rng: np.random.Generator) -> list[tuple[Floats, Floats]]:
         watches = [_BurnIn(detector) for detector in detectors]
         seed = int(rng.integers(2**31))
         simulation = Simulation(scenario, None, watches, None, runs, seed, fidelity=fidelity, threads=threads)

@@ -65,7 +65,7 @@ class FirstAlarms:
 
     def threshold(self, arl0: float) -> float:
         """The least threshold, to rounding, whose ARL₀ is not below ``arl0``."""
-        low, high = float(self._before.min()), float(self._record.max())
+        low, high = max(float(self._before.min()), self.floor), float(self._record.max())
         low = float(self._record.min()) - 1.0 if low == -math.inf else low
         while True:
             middle = 0.5 * (low + high)

@@ -11,6 +11,7 @@ from spoofgym import calibration
 from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_interval
 from spoofgym.clean_statistics import white_statistics
 from spoofgym.detectors import Acna, Snapshot, Windowed, make_detector
+from spoofgym.first_alarms import FirstAlarms
 
 UNLIKELY = 1e-7
 WHITE = white_statistics(np.eye(3), 200)
@@ -156,6 +157,22 @@ def test_a_threshold_that_is_known_stays(specification, threshold, monkeypatch):
     detector = calibrated(make_detector(specification), scenario_of(np.eye(3)))
     assert detector.threshold == pytest.approx(threshold, rel=1e-9)
     assert not detector.calibrated
+
+
+def test_a_threshold_is_never_looked_for_below_what_was_forgotten():
+    """Runs whose statistic is 0 at first: what was forgotten must not look like thresholds that hardly ever alarm."""
+    rng = np.random.default_rng(6)
+    counted = FirstAlarms()
+    everything = FirstAlarms()
+    for forget in (True, False, False):
+        statistics = 20.0 + rng.chisquare(3, (4000, 30))
+        statistics[:, :5] = 0.0
+        for counter in (counted, everything):
+            counter.add(np.empty((4000, 0)), statistics)
+        if forget:
+            counted.forget_below(counted.threshold(500.0))
+    assert counted.threshold(3000.0) == pytest.approx(everything.threshold(3000.0), rel=1e-12)
+    assert counted.threshold(3000.0) > counted.floor > 0.0
 
 
 def test_the_program_prints_a_row(monkeypatch, capsys):

@@ -23,6 +23,12 @@ UNMATCHED = "liu-flight:markov_sigma=2,markov_time=30"
 FACTOR = np.array([[4.0, 0.0, 0.0], [1.0, 3.0, 0.0], [-2.0, 0.5, 6.0]])
 
 
+@pytest.fixture(autouse=True)
+def _empty_cache(monkeypatch, tmp_path):
+    """What is calibrated here is calibrated here."""
+    monkeypatch.setenv("SPOOFGYM_CACHE", str(tmp_path))
+
+
 def assert_poisson(events, low, high):
     """Events whose expectation lies between low and high."""
     assert stats.poisson.ppf(FALSE_FAILURE / 2, low) <= events <= stats.poisson.isf(FALSE_FAILURE / 2, high)

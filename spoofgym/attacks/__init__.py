@@ -64,7 +64,7 @@ def opponents(attacks: str | Attack | Sequence[str | Attack], clean: float) -> A
     if isinstance(attacks, str) and Specification.parse(attacks).name in POPULATIONS:
         if "clean" in Specification.parse(attacks).options:
             raise ValueError(f"the share of clean games is given by clean={clean:g}, not in {attacks!r}")
-        pool = make_attack(f"{attacks},clean={clean!r}")
+        pool = make_attack(f"{attacks},clean={float(clean)!r}")
         assert isinstance(pool, AttackPool)
         return pool
     several = [attacks] if isinstance(attacks, str | Attack) else list(attacks)

@@ -85,9 +85,11 @@ class Azimuth(Attack):
         """Fit the attack to a game; the offsets follow from the vehicle's velocity, which `follow` tells.
 
         Raises:
-            ValueError: the attack starts before the game or after its end.
+            ValueError: the attack starts before the game or after its end, or ends before it starts.
         """
         super().bind(timeline, num_runs)
+        if self.end is not None and self.end <= self._onset:
+            raise ValueError(f"azimuth: end must be later than the onset at {self._onset:g} s, got {self.end!r}")
         self._offsets = np.zeros((timeline.num_epochs + 1, 3))
 
     def follow(self, velocity: Floats) -> None:

@@ -30,9 +30,9 @@ class GrowingWindow(RelativeMotion):
     - An epoch without a fix neither alarms nor ends an alarm's window, which goes on growing.
 
     It is `RelativeMotion` with the same k until the first alarm, so that threshold, slope and ARL0 are the same. The
-    jump back to the true track ends an alarm that has lasted until then, however long the attack was. What is not remedied: a constant offset D
-    is believed once w > k D / (threshold + slope (t - t_0)), since the receiver's noise, which does not grow with the
-    window, is part of the threshold.
+    jump back to the true track ends an alarm that has lasted until then. What is not remedied: a constant offset D is
+    believed once w > k D / (threshold + slope (t - t_0)), since the receiver's noise, which does not grow with the
+    window, is part of the threshold; from then on the return to the true track is what alarms.
 
     Args:
         k: epochs that the window reaches back where there is no alarm.

@@ -227,13 +227,12 @@ def play_policy(
         attacks=world.attacks,
         clean=world.clean,
         fidelity=world.fidelity,
-        outage=world.disturbances.outage_share,
-        multipath=world.disturbances.multipath_share,
         threads=world.threads,
     )
     parts = []
     for first, count in _batches(episodes):
         game = DefenderGame(config, count, world.detectors)
+        game.confounders.disturbances = world.disturbances
         game.simulation.streams = RunStreams.from_seed(seed + first, count)
         game.reset(np.arange(count))
         record = _Record(game.simulation)

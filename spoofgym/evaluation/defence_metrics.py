@@ -94,7 +94,7 @@ def _from_onset(episodes: DefenceEpisodes) -> Flags:
 
 def first_exclusion(episodes: DefenceEpisodes) -> Runs:
     """Epochs from the onset to the first exclusion of a fix during the attack, (n,); -1 = never."""
-    hit = episodes.attacked & episodes.excluded
+    hit = episodes.attacked & episodes.excluded & episodes.available
     return np.where(hit.any(axis=1), hit.argmax(axis=1) - onset(episodes), NEVER)
 
 
@@ -122,7 +122,7 @@ def time_to_reuse(episodes: DefenceEpisodes) -> tuple[Runs, Flags]:
     summed[:, 1 : epochs + 1] = excluded.cumsum(axis=1)
     summed[:, epochs + 1 :] = summed[:, epochs : epochs + 1]
     steady = summed[:, STEADY : STEADY + epochs] == summed[:, :epochs]
-    after = steady & (np.arange(epochs) > last[:, None])
+    after = steady & episodes.available & (np.arange(epochs) > last[:, None])
     reuse = np.where(after.any(axis=1), after.argmax(axis=1) - last - 1, NEVER)
     return reuse, ends
 
@@ -130,10 +130,17 @@ def time_to_reuse(episodes: DefenceEpisodes) -> tuple[Runs, Flags]:
 def false_alarm_rate(episodes: DefenceEpisodes) -> float | None:
     """Exclusions begun on clean fixes before any attack, per epoch at which one could begin."""
     before = np.arange(episodes.error.shape[1]) < onset(episodes)[:, None]
-    was = np.zeros_like(episodes.excluded)
-    was[:, 1:] = episodes.excluded[:, :-1]
-    at_risk = before & episodes.clean & ~was
+    at_risk = before & episodes.clean & ~_excluded_before(episodes)
     return float((episodes.excluded & at_risk).sum() / at_risk.sum()) if at_risk.any() else None
+
+
+def _excluded_before(episodes: DefenceEpisodes) -> Flags:
+    """Whether the latest fix before each epoch was excluded, (n, K): an exclusion lasts through an outage."""
+    epochs = episodes.available.shape[1]
+    latest = np.maximum.accumulate(np.where(episodes.available, np.arange(epochs), -1), axis=1)[:, :-1]
+    before = np.zeros_like(episodes.excluded)
+    before[:, 1:] = np.take_along_axis(episodes.excluded, np.maximum(latest, 0), axis=1) & (latest >= 0)
+    return before
 
 
 def _censored_median(times: Runs, cases: int, interval: float) -> float | None:

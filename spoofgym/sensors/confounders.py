@@ -39,7 +39,8 @@ class Disturbances:
                 raise ValueError(f"disturbances: {name} must be from 0 to 1, got {getattr(self, name)!r}")
         for name in ("outage_duration", "multipath_duration", "multipath_sigma"):
             low, high = getattr(self, name)
-            validation.above("disturbances", name, low)
+            for value in (low, high):
+                validation.above("disturbances", name, value)
             if high < low:
                 raise ValueError(f"disturbances: {name} must be a least and a greatest value, got {(low, high)!r}")
 

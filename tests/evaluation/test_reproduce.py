@@ -162,6 +162,9 @@ def test_figures_of_a_run():
     np.testing.assert_array_equal(ours.reuse, [1.0, 0.0, math.inf, 0.0])
     np.testing.assert_allclose(ours.rmse, [math.sqrt(4.4), 0.0, 2.0, math.sqrt(0.9)])
     np.testing.assert_array_equal(ours.largest, [4.0, 0.0, 2.0, 3.0])
+    used[0, 5] = 1  # spoofed, and used after the alarm at 94 s
+    again = foi_games.spoofed_after_alarm(tracks_of(alarm, used, error), attack)
+    np.testing.assert_array_equal(again, [1.0, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("exponent", [0.7, 1.2, 2.5])

@@ -92,11 +92,15 @@ def test_angle_random_walk_of_every_grade(name):
 
 
 def test_units_of_the_data_sheet():
-    """Liu 2018, table 1, converted by hand."""
+    """Liu 2018, table 1, and the KVH 1775's class, converted by hand."""
     imu = grade("navigation")
     np.testing.assert_allclose(imu.bias_sigma[[0, 3]], [4.8481368e-8, 9.80665e-4], rtol=1e-7)
     np.testing.assert_allclose(imu.noise_density[[0, 3]], [1.4544410e-6, 1.96133e-4], rtol=1e-7)
     np.testing.assert_array_equal(imu.instability_sigma, np.zeros(6))
+    fog = grade("fog")
+    np.testing.assert_allclose(fog.bias_sigma[[0, 3]], [4.8481368e-7, 4.903325e-4], rtol=1e-7)
+    np.testing.assert_allclose(fog.noise_density[[0, 3]], [3.4906585e-6, 1.176798e-3], rtol=1e-7)
+    np.testing.assert_array_equal(fog.instability_sigma, np.zeros(6))
     np.testing.assert_allclose(HUMP.instability_sigma[[0, 3]], [3.0 * DEGREE_PER_HOUR, 60e-6 * 9.80665], rtol=1e-7)
 
 
@@ -130,7 +134,7 @@ def test_steps_follow_their_equations():
 
 
 def test_an_unknown_grade_lists_the_valid_ones():
-    valid = "unknown IMU grade 'tactic'; valid grades: navigation, tactical, industrial, automotive"
+    valid = "unknown IMU grade 'tactic'; valid grades: navigation, fog, tactical, industrial, automotive"
     with pytest.raises(ValueError, match=valid):
         grade("tactic")
 

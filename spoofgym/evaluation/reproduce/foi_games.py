@@ -181,6 +181,13 @@ def figures(tracks: Tracks, attack: Attacked) -> Figures:
     )
 
 
+def spoofed_after_alarm(tracks: Tracks, attack: Attacked) -> Floats:
+    """Spoofed fixes that each run uses after its first alarm of the attack, (N,)."""
+    first = figures(tracks, attack).first_alarm
+    late = (tracks.time > first[:, None]) & (tracks.time < attack.end)
+    return np.sum(tracks.used & late, axis=1).astype(np.float64)
+
+
 def length(vectors: Floats) -> Floats:
     """Of vectors (N, K+1, 3), (N, K+1)."""
     return np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2 + vectors[..., 2] ** 2)

@@ -1,0 +1,172 @@
+"""Results of calibration on disk: read only by the code that made them, and no trouble where there is no disk."""
+
+import dataclasses
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+import spoofgym
+from spoofgym import calibration, calibration_cache
+from spoofgym.calibration import calibrated, calibrated_all
+from spoofgym.calibration_cache import Setting
+from spoofgym.detectors import Windowed, make_detector
+from spoofgym.scenarios import make_scenario
+
+SCENARIO = "liu-flight:horizon=30"
+NAME = "0" * 64
+SETTING = Setting(12.5, 1000.25, 0.1 + 0.2)
+
+
+@pytest.fixture(autouse=True)
+def place(monkeypatch, tmp_path):
+    """An empty folder, and a program that remembers nothing."""
+    monkeypatch.setenv("SPOOFGYM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(calibration, "_KNOWN", {})
+    return tmp_path / "cache"
+
+
+def new_program(monkeypatch, *, may_calibrate):
+    """Forget what is in memory."""
+    monkeypatch.setattr(calibration, "_KNOWN", {})
+    if not may_calibrate:
+        for name in ("calibrate", "calibrate_together"):
+            monkeypatch.setattr(calibration, name, lambda *_, **__: pytest.fail("calibrated again"))
+
+
+def test_a_result_comes_back_to_the_last_bit(place):
+    assert calibration_cache.load(NAME) is None
+    for setting in (SETTING, Setting(3.0, 5.0), Setting(slope=-0.25)):
+        calibration_cache.store(NAME, setting, "a remark")
+        assert calibration_cache.load(NAME) == setting
+    assert [path.name for path in place.iterdir()] == [f"{NAME}.json"]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "{",
+        "[1]",
+        "{}",
+        '{"setting": null}',
+        '{"setting": {}}',
+        '{"setting": {"threshold": "3"}}',
+        '{"setting": {"threshold": NaN}}',
+        '{"setting": {"threshold": -1.0}}',
+        '{"setting": {"other": 1.0}}',
+        b"\xff\xfe",
+    ],
+)
+def test_a_damaged_file_is_none(place, content):
+    calibration_cache.store(NAME, SETTING, "")
+    path = place / f"{NAME}.json"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert calibration_cache.load(NAME) is None
+    calibration_cache.store(NAME, SETTING, "")
+    assert calibration_cache.load(NAME) == SETTING
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("SPOOFGYM_CACHE", str(tmp_path / "file" / "below"))
+    calibration_cache.store(NAME, SETTING, "")
+    assert calibration_cache.load(NAME) is None
+    assert calibrated(make_detector("windowed:n=2,arl0=20"), make_scenario(SCENARIO)).calibrated
+
+
+def test_a_write_that_fails_leaves_nothing(place, monkeypatch):
+    def full(*_):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(Path, "replace", full)
+    calibration_cache.store(NAME, SETTING, "")
+    assert list(place.iterdir()) == []
+
+
+def test_where_results_lie(monkeypatch):
+    assert calibration_cache.folder() == Path(os.environ["SPOOFGYM_CACHE"])
+    monkeypatch.setenv("SPOOFGYM_CACHE", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert calibration_cache.folder() == Path("/somewhere/spoofgym")
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    assert calibration_cache.folder() == Path.home() / ".cache" / "spoofgym"
+
+
+def test_the_next_program_reads_what_this_one_found(place, monkeypatch):
+    """White innovations and simulated runs, with a slope and without a threshold."""
+    texts = ("windowed:n=3,arl0=50", "relative-motion:k=5,arl0=100", "relative-motion:k=5,preset=foi")
+    first = calibrated_all([make_detector(text) for text in texts], make_scenario(SCENARIO))
+    assert len(list(place.glob("*.json"))) == 3
+    new_program(monkeypatch, may_calibrate=False)
+    again = calibrated_all([make_detector(text) for text in texts], make_scenario(SCENARIO))
+    for one, other in zip(first, again, strict=True):
+        assert (one.name, one.threshold, one.arl0) == (other.name, other.threshold, other.arl0)
+    assert [detector.slope for detector in first[1:]] == [detector.slope for detector in again[1:]]
+    remarks = {json.loads(path.read_text())["what"] for path in place.glob("*.json")}
+    assert remarks == {f"{text} in {SCENARIO}, linear" for text in texts}
+
+
+def test_other_code_or_settings_make_another_result(place, monkeypatch):
+    scenario, text = make_scenario(SCENARIO), "windowed:n=3,arl0=50"
+    first = calibrated(make_detector(text), scenario)
+    changes = [(calibration_cache, "SOURCE", "other"), (calibration, "RUNS", 4000), (calibration, "FIRST_ALARMS", 300)]
+    for count, (module, name, value) in enumerate(changes, start=2):
+        monkeypatch.setattr(module, name, value)
+        new_program(monkeypatch, may_calibrate=True)
+        other = calibrated(make_detector(text), scenario)
+        assert len(list(place.glob("*.json"))) == count
+    assert other.threshold != first.threshold
+    different = [("a", "b", "c"), ("a", "c", "b"), ("ab", "c", ""), ("a", "b,c")]
+    assert len({calibration_cache.key(*parts) for parts in different}) == len(different)
+
+
+def test_the_digest_covers_what_decides_a_result(monkeypatch, tmp_path):
+    copy = shutil.copytree(
+        Path(spoofgym.__file__).parent, tmp_path / "spoofgym", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    monkeypatch.setattr(spoofgym, "__file__", str(copy / "__init__.py"))
+    before = calibration_cache._source()
+    assert before == calibration_cache._source()
+    for name in ("envs/config.py", "responses/base.py"):
+        (copy / name).write_text("# another environment\n")
+    assert calibration_cache._source() == before
+    digests = {before}
+    for name in (
+        *("sensors/imu.py", "navigation/kalman.py", "detectors/ring.py", "scenarios/liu_flight.py", "attacks/base.py"),
+        *("simulation.py", "scenario.py", "calibration.py", "trajectory.py", "geodesy.py", "first_alarms.py"),
+    ):
+        (copy / name).write_text((copy / name).read_text() + "\n")
+        digests.add(calibration_cache._source())
+    assert len(digests) == 12
+
+
+def test_objects_that_their_name_does_not_build_stay_in_memory(place):
+    class Own(Windowed):
+        """A user's class that keeps the name of its base."""
+
+    scenario = make_scenario(SCENARIO)
+    other = dataclasses.replace(scenario, horizon=25)
+    assert other.name == scenario.name
+    assert calibration_cache.spelled_out_scenario(scenario)
+    assert calibration_cache.spelled_out_scenario(dataclasses.replace(scenario))
+    assert not calibration_cache.spelled_out_scenario(other)
+    assert not calibration_cache.spelled_out_scenario(dataclasses.replace(scenario, name="unheard-of"))
+    assert calibrated(Own(3, arl0=50.0), scenario).calibrated
+    assert calibrated(make_detector("windowed:n=4,arl0=50"), other).calibrated
+    assert not place.exists()
+
+
+def test_together_is_the_same_as_alone(monkeypatch, tmp_path):
+    """Coloured noise: the burn-in that one detector needs must not change the runs of another."""
+    scenario = make_scenario("liu-flight:horizon=30,markov_sigma=2,markov_time=30")
+    texts = ("snapshot:arl0=100", "windowed:n=4,arl0=60", "relative-motion:k=5,arl0=100", "signed-mean:arl0=80")
+    together = calibrated_all([make_detector(text) for text in texts], scenario)
+    for text, detector in zip(texts, together, strict=True):
+        monkeypatch.setenv("SPOOFGYM_CACHE", str(tmp_path / text))
+        new_program(monkeypatch, may_calibrate=True)
+        alone = calibrated(make_detector(text), scenario)
+        assert (alone.threshold, alone.arl0) == (detector.threshold, detector.arl0)
+        assert getattr(alone, "slope", None) == getattr(detector, "slope", None)
