@@ -30,7 +30,7 @@ from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario
 from train.arguments import count, seed_number
-from train.defender_ppo import Settings, environment_arguments, export, make_learner
+from train.defender_ppo import Settings, begin, environment_arguments, export, make_learner
 from train.ppo import CHECKPOINT_FILE, load_checkpoint, save_checkpoint
 from train.watch import Watch, mean_return
 
@@ -104,7 +104,7 @@ class Training:
         self, config: DefenderConfig, settings: Settings, seed: int, steps: int, folder: Path, console: Console
     ) -> None:
         """Build the learner and write down what is trained."""
-        self._config, self._settings, self._steps = config, settings, steps
+        self._config, self._settings, self._seed, self._steps = config, settings, seed, steps
         self._folder, self._console = folder, console
         self._learner = make_learner(config, settings, seed, folder)
         scenario = make_scenario(config.scenario)
@@ -130,9 +130,13 @@ class Training:
             load_checkpoint(self._learner, self._folder)
             path = self._folder / VALIDATION_FILE
             self._validation = json.loads(path.read_text()) if path.is_file() else []
-        begin, before, interrupted = time.perf_counter(), self._learner.num_timesteps, False
+        started, before, interrupted = time.perf_counter(), self._learner.num_timesteps, False
         self._watch.start()
         try:
+            if before == 0 and self._settings.imitate:
+                begin(self._learner, self._config, self._settings, self._seed)
+                self._learner.num_timesteps = 0
+                self._keep(self._learner)
             if before < self._steps:
                 self._learner.learn(
                     self._steps - before, callback=self._watch, reset_num_timesteps=before == 0, tb_log_name="ppo"
@@ -144,7 +148,7 @@ class Training:
         save_checkpoint(self._learner, self._folder)
         if not interrupted or not (self._folder / POLICY_FILE).is_file():
             self._keep(self._learner)
-        played, seconds = self._learner.num_timesteps - before, time.perf_counter() - begin
+        played, seconds = self._learner.num_timesteps - before, time.perf_counter() - started
         self._console.print(
             f"{'interrupted after' if interrupted else 'trained'} {played:,} steps in {seconds:.0f} s, validation "
             f"included ({played / max(seconds, 1e-9):,.0f} steps/s); {self._best()}; policy in {self._folder}",

@@ -18,15 +18,19 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 from torch import nn
 
 from agents.learned import LearnedDefender
 from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.defender_game import EXCLUDE
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
+from train.imitation import imitate
 from train.ppo import LAST_RATE, arrays
+
+EXCLUDING_FIELD = "last decision was to exclude"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +46,11 @@ class Settings:
         gamma: discount per epoch.
         gae_lambda: of the advantage estimate.
         clip_range: of the policy ratio.
-        entropy: weight of the policy's entropy at the start; falls with the learning rate's schedule by the clip only.
+        entropy: weight of the policy's entropy.
         hidden: width of the two hidden layers of policy and value.
+        imitate: begin with the actions of a classical defender (`train.imitation`).
+        critic_games: games of every lane in which only the critic learns, after that.
+        reward_scale: factor on the rewards.
         privileged: whether the critic sees the privileged state.
         validation_episodes: games of the training attacks on which checkpoints are compared.
     """
@@ -58,6 +65,9 @@ class Settings:
     clip_range: float = 0.2
     entropy: float = 0.0
     hidden: int = 64
+    imitate: bool = True
+    critic_games: int = 6
+    reward_scale: float = 0.1
     privileged: bool = True
     validation_episodes: int = 4000
 
@@ -111,26 +121,75 @@ def _tanh_network(inputs: int, hidden: int) -> nn.Sequential:
     return nn.Sequential(nn.Linear(inputs, hidden), nn.Tanh(), nn.Linear(hidden, hidden), nn.Tanh())
 
 
-class SlicedPolicy(ActorCriticPolicy):
-    """An actor that sees the first ``width`` entries of the observation, and a critic that sees all."""
+class DefenderPolicy(ActorCriticPolicy):
+    """An actor that sees the first ``width`` entries of the observation, and a critic that sees all.
 
-    def __init__(self, *args: Any, width: int, hidden: int, **kwargs: Any) -> None:
-        self._width, self._hidden = width, hidden
+    The depth of a backtrack counts only where the action begins an exclusion, as in the environment: elsewhere it has
+    no probability and no entropy, so that no gradient rewards or blames it.
+    """
+
+    def __init__(self, *args: Any, width: int, hidden: int, excluding: int, **kwargs: Any) -> None:
+        """Let the actor see ``width`` entries, of which number ``excluding`` tells whether GNSS is left out already."""
+        self._width, self._hidden, self._excluding = width, hidden, excluding
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor: Any = SlicedNetworks(self._width, self.features_dim, self._hidden)
 
+    def forward(  # type: ignore[override]
+        self, obs: torch.Tensor, deterministic: bool = False
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Actions, values and the probability of the actions."""
+        latent, value = self.mlp_extractor(obs)
+        distribution = self._get_action_dist_from_latent(latent)
+        actions = distribution.get_actions(deterministic=deterministic)
+        log_probability, _ = self._judge(distribution, obs, actions)
+        return actions, self.value_net(value), log_probability
+
+    def evaluate_actions(
+        self, obs: torch.Tensor, actions: torch.Tensor  # type: ignore[override]
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Values, the probability of the actions, and the entropy."""
+        latent, value = self.mlp_extractor(obs)
+        log_probability, entropy = self._judge(self._get_action_dist_from_latent(latent), obs, actions)
+        return self.value_net(value), log_probability, entropy
+
+    def _judge(
+        self, distribution: Any, obs: torch.Tensor, actions: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        decision, depth = distribution.distribution
+        begins = (actions[:, 0] == EXCLUDE) & (obs[:, self._excluding] < 0.5)
+        log_probability = decision.log_prob(actions[:, 0]) + begins * depth.log_prob(actions[:, 1])
+        return log_probability, decision.entropy() + begins * depth.entropy()
+
+
+class ScaledRewards(VecEnvWrapper):
+    """Rewards times a factor: returns of the order of one, so that the critic's gradient does not drown the actor's."""
+
+    def __init__(self, venv: VecEnv, factor: float) -> None:
+        """Scale the rewards of ``venv``."""
+        super().__init__(venv)
+        self._factor = factor
+
+    def reset(self) -> VecEnvObs:
+        """Start new episodes in all lanes."""
+        return self.venv.reset()
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """One step of all lanes."""
+        observation, reward, done, infos = self.venv.step_wait()
+        return observation, self._factor * reward, done, infos
+
 
 def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: Path) -> PPO:
     """A PPO learner on ``settings.lanes`` lanes of the game, seeded; TensorBoard writes into ``folder``."""
-    trained = replace(config, clean=settings.clean)
-    vector = DefenderVectorEnv(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(trained))
+    vector = lanes(config, settings)
     horizon = vector.game.scenario.timeline.num_epochs
+    layout = [field.name for field in vector.game.fields]
     adapted = PrivilegedVecEnv(vector) if settings.privileged else SB3VecEnv(vector)
     return PPO(
-        SlicedPolicy,
-        VecMonitor(adapted),
+        DefenderPolicy,
+        ScaledRewards(VecMonitor(adapted), settings.reward_scale),
         n_steps=horizon,
         batch_size=max(1, settings.lanes * horizon // settings.minibatches),
         n_epochs=settings.epochs,
@@ -139,11 +198,29 @@ def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: 
         gae_lambda=settings.gae_lambda,
         clip_range=settings.clip_range,
         ent_coef=settings.entropy,
-        policy_kwargs={"width": len(vector.game.fields), "hidden": settings.hidden},
+        policy_kwargs={"width": len(layout), "hidden": settings.hidden, "excluding": layout.index(EXCLUDING_FIELD)},
         tensorboard_log=str(folder / "tensorboard"),
         seed=seed,
         device="cpu",
     )
+
+
+def lanes(config: DefenderConfig, settings: Settings) -> DefenderVectorEnv:
+    """The lanes of a training."""
+    trained = replace(config, clean=settings.clean)
+    return DefenderVectorEnv(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(trained))
+
+
+def begin(learner: PPO, config: DefenderConfig, settings: Settings, seed: int) -> None:
+    """Teach the policy the classical defender's actions, then the critic that policy's returns."""
+    imitate(learner, lanes(config, settings), seed)
+    policy = learner.policy
+    actor = [*policy.mlp_extractor.policy_net.parameters(), *policy.action_net.parameters()]
+    for parameter in actor:
+        parameter.requires_grad_(False)
+    learner.learn(settings.critic_games * settings.lanes * learner.n_steps, tb_log_name="critic")
+    for parameter in actor:
+        parameter.requires_grad_(True)
 
 
 def export(learner: PPO, config: DefenderConfig, folder: Path) -> LearnedDefender:

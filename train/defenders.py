@@ -14,6 +14,7 @@ from agents.defenders import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tune
 from agents.learned import LearnedDefender
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
+from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.evaluation.defence import (
     DefenceEpisodes,
     World,
@@ -32,6 +33,8 @@ from spoofgym.scenario import Scenario
 POPULATIONS = {"training": False, "held-out": True}
 """Populations of attacks, and whether a defender never sees them in training."""
 ORACLE_DEPTH = "oracle-depth"
+LEARNED_MEAN = "mean of the learned"
+"""Stands for all learned defenders of a comparison: their mean error in each game."""
 
 
 def world_of(
@@ -52,6 +55,21 @@ def world_of(
     built = {detector.name: detector for detector in map(make_detector, names)}
     detectors = tuple(calibrated_all(list(built.values()), scenario))
     return World(scenario, attacks, 0.5, detectors, fidelity=fidelity, threads=threads)
+
+
+def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
+    """Refuse policies that do not fit the game.
+
+    Raises:
+        ValueError: a policy was trained on another observation, or on another number of depths.
+    """
+    for policy in policies:
+        config = replace(policy.config, scenario=world.scenario, fidelity=world.fidelity)
+        game = DefenderGame(config, 1, world.detectors)
+        policy.check_layout(game.fields)
+        actions, outputs = 2 + len(game.depths), len(policy.biases[-1])
+        if outputs != actions:
+            raise ValueError(f"policy {policy.name!r} was trained on {outputs - 2} depths, the game has {actions - 2}")
 
 
 @dataclass(frozen=True)
@@ -171,7 +189,7 @@ def comparisons(learned: Sequence[Played], others: Sequence[Played], held_out: b
         mean = np.mean([one.episodes.error.mean(axis=1) for one in learned], axis=0)
         pairs = [(one.name, paired_difference(one.episodes, other.episodes)) for one in learned]
         if len(learned) > 1:
-            pairs.append(("mean of the learned", difference(mean, other.episodes.error.mean(axis=1))))
+            pairs.append((LEARNED_MEAN, difference(mean, other.episodes.error.mean(axis=1))))
         for name, found in pairs:
             result.append(
                 {
@@ -227,6 +245,7 @@ def evaluate_defenders(
     for population in populations:
         held_out = POPULATIONS[population]
         world = world_of(scenario, population, fidelity, threads, policies, given)
+        check_policies(world, policies)
         played = list(Defenders(world, episodes, seed, console).play(tuned_for(scenario.name), given, policies))
         learned = [item for item in played if item.kind == "learned"]
         for item in played:

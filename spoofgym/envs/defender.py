@@ -68,7 +68,7 @@ class DefenderEnv(SingleEnv):
     | 15 | onset estimate, epochs back | epochs | 20 |
     | 16 | score of the onset estimate | 1 | 20 |
     | 17 | suspicion | 1 | not squashed |
-    | 18 | quiet epochs in a row | epochs | 5 |
+    | 18 | quiet fixes since the suspicion | epochs | 5 |
     | 19 | GNSS available | 1 | not squashed |
     | 20 | last decision was to exclude | 1 | not squashed |
     | 21 | coasting time | s | 20 |
@@ -86,8 +86,9 @@ class DefenderEnv(SingleEnv):
     - Signed means are those of the whitened horizontal innovations, times the root of their number, so that each axis
       is standard normal where the filter is matched and nobody attacks. The score of the onset estimate is the largest
       |sum of the last n|² / n, n up to 50, and the estimate is that n (`spoofgym.responses.onset`).
-    - Suspicion rises when the squared signed mean of 5 epochs exceeds its 1e-3 quantile (chi-square, 2 degrees of
-      freedom) and is dropped after 5 quiet epochs in a row, whose NIS lies below its own 1e-3 quantile.
+    - Suspicion is what a classical defender believes: it rises when the squared signed mean of 10 epochs exceeds its
+      1e-3 quantile (chi-square, 2 degrees of freedom) and is dropped after 5 quiet fixes in a row, whose NIS lies below
+      its own 1e-3 quantile.
     - Estimates of velocity, position sigma and biases are the filter's own, before the fix of the epoch. The scale of
       what is measured in metres is the scenario's `defender_scale`.
     - In an outage the innovations are zero, and nothing but the last decision tells a coast by choice.

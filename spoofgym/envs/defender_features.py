@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numba import njit
@@ -19,9 +18,9 @@ from spoofgym.simulation import Simulation
 SHORT, LONG = 5, 10
 """Epochs of the signed means."""
 QUIET_P = 1e-3
-"""An epoch is quiet whose NIS, or whose signed mean, is exceeded with a greater probability under a matched filter."""
+"""A fix is quiet whose NIS is exceeded with a greater probability under a matched filter; likewise the signed mean."""
 QUIET_EPOCHS = 5
-"""Quiet epochs in a row after which a suspicion is dropped."""
+"""Quiet fixes in a row after which a suspicion is dropped."""
 
 
 def defender_fields(
@@ -45,7 +44,7 @@ def defender_fields(
         Field("onset estimate, epochs back", "epochs", 20.0),
         Field("score of the onset estimate", "1", 20.0),
         Field("suspicion", "1", 0.0),
-        Field("quiet epochs in a row", "epochs", 5.0),
+        Field("quiet fixes since the suspicion", "epochs", 5.0),
         Field("GNSS available", "1", 0.0),
         Field("last decision was to exclude", "1", 0.0),
         Field("coasting time", "s", 20.0),
@@ -64,6 +63,8 @@ class DefenderFeatures:
 
     Attributes:
         fields: the entries, in order.
+        suspicion: whether a classical defender would exclude, (N,).
+        onset_depth: epochs since the estimated onset, (N,).
     """
 
     def __init__(
@@ -78,7 +79,9 @@ class DefenderFeatures:
         self._means = np.zeros((num_lanes, LONG, 2))
         self._residual = np.zeros((num_lanes, 2))
         self._velocity = np.zeros((num_lanes, 3))
-        self._suspicion = np.zeros(num_lanes, dtype=bool)
+        self.suspicion = np.zeros(num_lanes, dtype=bool)
+        self.onset_depth = np.zeros(num_lanes, dtype=np.int64)
+        self._old_alarm = np.zeros(num_lanes, dtype=bool)
         self._quiet = np.zeros(num_lanes, dtype=np.int64)
         self._raw = np.zeros((num_lanes, len(self.fields)))
         self._quiet_nis, self._quiet_mean = quantile(QUIET_P, scenario.dimension), quantile(QUIET_P, 2)
@@ -90,7 +93,7 @@ class DefenderFeatures:
         """Forget the games of these lanes."""
         self._onset.reset(lanes)
         self._means[lanes], self._residual[lanes], self._velocity[lanes] = 0.0, 0.0, np.nan
-        self._suspicion[lanes], self._quiet[lanes] = False, 0
+        self.suspicion[lanes], self._old_alarm[lanes], self._quiet[lanes] = False, False, 0
 
     def update(self, excluding: Flags, coast: Runs, lanes: Runs) -> None:
         """See the present epoch of these lanes.
@@ -104,7 +107,7 @@ class DefenderFeatures:
         assert epoch.available is not None
         assert epoch.view is not None
         self._onset.push(epoch.innovation.whitened[:, :2], lanes)
-        depth, score = self._onset.estimate()
+        self.onset_depth, score = self._onset.estimate()
         statistics = np.empty((len(coast), len(self._thresholds)))
         for place, name in enumerate(self._detectors):
             statistics[:, place] = epoch.statistics[name]
@@ -117,7 +120,7 @@ class DefenderFeatures:
             epoch.available,
             statistics,
             self._thresholds,
-            depth,
+            self.onset_depth,
             score,
             excluding,
             np.asarray(coast * self._interval, dtype=np.float64),
@@ -132,7 +135,8 @@ class DefenderFeatures:
             self._means,
             self._residual,
             self._velocity,
-            self._suspicion,
+            self.suspicion,
+            self._old_alarm,
             self._quiet,
             self._raw,
         )
@@ -167,7 +171,8 @@ def _fill(
     means: Floats,
     last_residual: Floats,
     last_velocity: Floats,
-    suspicion: Any,
+    suspicion: Flags,
+    old_alarm: Flags,
     quiet: Runs,
     raw: Floats,
 ) -> None:
@@ -192,11 +197,7 @@ def _fill(
                 last_residual[lane, a] = residual[lane, a]
         place += 4
         if available[lane]:
-            quiet[lane] = quiet[lane] + 1 if nis[lane] < quiet_nis else 0
-        if square > quiet_mean:
-            suspicion[lane] = True
-        elif quiet[lane] >= QUIET_EPOCHS:
-            suspicion[lane] = False
+            _suspect(lane, square > quiet_mean, nis[lane] < quiet_nis, suspicion, old_alarm, quiet)
         row[place] = depth[lane]
         row[place + 1] = score[lane]
         row[place + 2] = 1.0 if suspicion[lane] else 0.0
@@ -225,7 +226,7 @@ def _signed_means(ring: Floats, index: int, whitened: Floats, row: Floats) -> fl
     """Put the newest horizontal innovation into its ring (10, 2) and write √n times the means of 5 and 10 epochs, (4,).
 
     Returns:
-        The square of the shorter one, chi-square with 2 degrees of freedom under a matched filter.
+        The square of the longer one, chi-square with 2 degrees of freedom under a matched filter.
     """
     for a in range(2):
         ring[index % LONG, a] = whitened[a]
@@ -238,4 +239,20 @@ def _signed_means(ring: Floats, index: int, whitened: Floats, row: Floats) -> fl
                 short += value
         row[a] = short / np.sqrt(SHORT)
         row[2 + a] = long / np.sqrt(LONG)
-    return row[0] ** 2 + row[1] ** 2
+    return row[2] ** 2 + row[3] ** 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _suspect(lane: int, alarm: bool, agrees: bool, suspicion: Flags, old_alarm: Flags, quiet: Runs) -> None:
+    """What a classical defender would believe: `spoofgym.responses.reuse.Consistent` after the alarm of a signed mean.
+
+    An alarm raises the suspicion, five fixes in a row that agree drop it; an alarm that lasts on from before then does
+    not raise it again.
+    """
+    old_alarm[lane] = old_alarm[lane] and alarm and agrees
+    if suspicion[lane]:
+        quiet[lane] = quiet[lane] + 1 if agrees else 0
+        if quiet[lane] >= QUIET_EPOCHS:
+            suspicion[lane], quiet[lane], old_alarm[lane] = False, 0, alarm
+    elif alarm and not old_alarm[lane]:
+        suspicion[lane] = True

@@ -85,14 +85,16 @@ def test_responses_of_a_depth(depth, options, expected):
     make_response(expected)
 
 
-@pytest.mark.parametrize("text", ["snapshot > exclude:reuse=3", "snapshot>exclude:reuse=3", "  snapshot >exclude:reuse=3 "])
+@pytest.mark.parametrize(
+    "text", ["snapshot > exclude:reuse=3", "snapshot>exclude:reuse=3", " snapshot >exclude:reuse=3 "]
+)
 def test_spelling(text):
     assert parse(text) == ClassicalDefender("snapshot > exclude:reuse=3", "snapshot", "exclude:reuse=3")
 
 
 @pytest.mark.parametrize("text", ["snapshot", "", ">", "snapshot >", "> exclude"])
 def test_other_texts_are_told_how_to_spell(text):
-    with pytest.raises(ValueError, match="spelled 'detector > response', e.g. 'snapshot > exclude', got"):
+    with pytest.raises(ValueError, match=r"spelled 'detector > response', e\.g\. 'snapshot > exclude', got"):
         parse(text)
 
 

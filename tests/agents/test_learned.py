@@ -6,9 +6,10 @@ import json
 import numpy as np
 import pytest
 import torch
+from stable_baselines3.common.distributions import MultiCategoricalDistribution
 
-from agents.learned import CONFIG_FILE, POLICY_FILE, LearnedSpoofer
-from spoofgym.envs.config import SpooferConfig
+from agents.learned import CONFIG_FILE, POLICY_FILE, LearnedDefender, LearnedSpoofer
+from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.observation import spoofer_fields
 
 FIELDS = spoofer_fields("shadow", 3, ("snapshot",))
@@ -77,3 +78,52 @@ def test_damaged_config(folder, content):
     (folder / CONFIG_FILE).write_text(content)
     with pytest.raises(ValueError, match="damaged run folder"):
         LearnedSpoofer.load(folder)
+
+
+# --- the defender -----------------------------------------------------------------------------------------------------
+
+DEPTHS = 5
+
+
+@pytest.fixture
+def defender():
+    rng = np.random.default_rng(2)
+    sizes = [7, 16, 16, 2 + DEPTHS]
+    weights = tuple(rng.normal(size=(b, a)).astype(np.float32) for a, b in itertools.pairwise(sizes))
+    biases = tuple(rng.normal(size=b).astype(np.float32) for b in sizes[1:])
+    layout = tuple(f"entry {i}" for i in range(7))
+    return LearnedDefender("d", DefenderConfig(scenario="foi-drive:horizon=60"), layout, weights, biases)
+
+
+def test_a_defender_plays_the_likeliest_action(defender):
+    """As a MultiDiscrete distribution with torch's logits would: the largest of the first two, and of the others."""
+    layers = []
+    for weight, bias in zip(defender.weights, defender.biases, strict=True):
+        layer = torch.nn.Linear(weight.shape[1], weight.shape[0])
+        layer.weight.data, layer.bias.data = torch.from_numpy(weight), torch.from_numpy(bias)
+        layers += [layer, torch.nn.Tanh()]
+    network = torch.nn.Sequential(*layers[:-1])
+    observation = np.random.default_rng(3).uniform(-1, 1, (200, 7)).astype(np.float32)
+    distribution = MultiCategoricalDistribution([2, DEPTHS])
+    with torch.no_grad():
+        expected = distribution.proba_distribution(network(torch.from_numpy(observation))).mode().numpy()
+    actions = defender.act(observation)
+    assert actions.dtype == np.int64
+    np.testing.assert_array_equal(actions, expected)
+    assert set(actions[:, 0]) == {0, 1}
+    assert len(set(actions[:, 1])) > 2
+
+
+def test_a_saved_defender_comes_back(defender, tmp_path):
+    defender.save(tmp_path)
+    environment = {"scenario": "foi-drive:horizon=60", "detectors": ["snapshot"], "clean": 0.25}
+    (tmp_path / CONFIG_FILE).write_text(json.dumps({"environment": environment}))
+    loaded = LearnedDefender.load(tmp_path)
+    assert loaded.config == DefenderConfig(scenario="foi-drive:horizon=60", detectors=["snapshot"], clean=0.25)
+    observation = np.random.default_rng(4).uniform(-1, 1, (20, 7)).astype(np.float32)
+    np.testing.assert_array_equal(loaded.act(observation), defender.act(observation))
+
+
+def test_a_spoofers_run_folder_is_no_defenders(folder):
+    with pytest.raises(ValueError, match="unknown argument 'knowledge'; valid arguments: scenario"):
+        LearnedDefender.load(folder)

@@ -2,6 +2,7 @@
 
 import cmath
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,6 +86,14 @@ def test_largest_offsets_are_those_of_another_programme(drive, number):
     if number in (1, 2, 3, 4):
         degrees = max(map(abs, printed(drive, number, unit=math.pi / 180.0).values()))
         assert degrees < 0.75 * largest
+
+
+def test_the_page_states_these_offsets(drive):
+    page = (Path(__file__).parents[2] / "docs" / "attacks.md").read_text(encoding="utf-8")
+    (row,) = (line for line in page.splitlines() if line.startswith("| here |"))
+    stated = [float(cell) for cell in row.strip("|").split("|")[1:]]
+    ours = [np.hypot(*offsets_of(bound(f"foi-{number}", drive))[:, :2].T).max() for number in FOI_SCENARIOS]
+    np.testing.assert_allclose(ours, stated, rtol=0.0, atol=0.0501)
 
 
 def test_scenario_3_runs_in_parallel_for_forty_seconds(drive):

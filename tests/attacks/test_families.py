@@ -185,6 +185,16 @@ def test_manoeuvres_are_found():
     assert manoeuvre_times(TURNING[95:], Timeline(115.0, 1.0, 135)) == (165.0,)
 
 
+@pytest.mark.parametrize(("interval", "pause", "times"), [(1.0, 1, 1), (1.0, 2, 2), (0.5, 3, 1), (0.5, 4, 2)])
+def test_a_manoeuvre_is_a_new_one_after_two_quiet_seconds(interval, pause, times):
+    """Four steps of acceleration, a pause, four more; 0.29 m/s² is no acceleration, and one upward does not count."""
+    gains = interval * np.array([0.29] * 5 + [0.31] * 4 + [0.29] * pause + [0.31] * 4 + [0.0] * 5)
+    speed = np.concatenate([[20.0], 20.0 + np.cumsum(gains)])
+    velocity = np.stack([np.zeros_like(speed), speed, 10.0 * speed], axis=1)
+    expected = 100.0 + interval * np.array([5.0, 9.0 + pause])
+    assert manoeuvre_times(velocity, Timeline(100.0, interval, len(gains))) == tuple(expected[:times])
+
+
 def test_a_share_begins_in_view_of_a_manoeuvre():
     """All, none, and 15 % by default; at most 10 s before the speed changes."""
     pool = AttackPool([(RandomJump(manoeuvre=1.0), 1.0)], clean=0.0)

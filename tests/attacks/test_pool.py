@@ -69,6 +69,16 @@ def test_first_and_last_enclose_the_offsets():
             assert (spoofed[0], spoofed[-1]) == (pool.first[run], pool.last[run])
 
 
+def test_a_run_that_draws_no_opponent_forgets_the_last_one():
+    pool, streams = drawn("training", 60), RunStreams.from_seed(1, 60)
+    before = pool.member.copy()
+    pool.reset(np.arange(60), streams)
+    freed = (before >= 0) & (pool.member == -1)
+    assert np.any(freed)
+    assert not np.any(pool.offsets[freed])
+    assert np.all((pool.first[freed] == 61) & (pool.last[freed] == 0))
+
+
 def test_a_run_has_its_own_opponent_for_any_number_of_runs():
     whole = drawn("training", 40)
     for part, runs in ((drawn("training", 7), slice(0, 7)), (drawn("training", 1, seed=30), slice(30, 31))):

@@ -252,5 +252,5 @@ def test_no_episodes_are_refused(world, play):
 
 
 def test_what_is_not_there_cannot_be_watched(world):
-    with pytest.raises(ValueError, match="no detector 'windowed'; there are: snapshot, signed-mean:p_fa=0.001"):
+    with pytest.raises(ValueError, match=r"no detector 'windowed'; there are: snapshot, signed-mean:p_fa=0\.001"):
         play_response(world, "windowed", make_response("exclude"), 1, 0)

@@ -184,7 +184,7 @@ def nine_states_from_the_motion(scenario, use):
     rate[3:6, 6:] = 9.81 / 6.37e6 * np.diag([-1.0, -1.0, 2.0])
     priors = []
     for i, acceleration in enumerate(np.diff(truth.velocity[: round(250 * truth.rate) + 1], axis=0) / step):
-        rate[3:6, :3] = cross(acceleration + [0.0, 0.0, 9.81])
+        rate[3:6, :3] = cross(acceleration + np.array([0.0, 0.0, 9.81]))
         transition = np.eye(9) + step * rate + 0.5 * step**2 * rate @ rate
         covariance = transition @ covariance @ transition.T + step * np.diag(density)
         if (i + 1) % round(truth.rate) == 0:
@@ -199,7 +199,7 @@ def nine_states_from_the_motion(scenario, use):
 
 @pytest.mark.parametrize("process_noise", [1, 1000])
 def test_the_nine_states_follow_from_the_motion(process_noise):
-    """The whole drive with 50 s unaided from 100 s on, through a turn: to half a percent of 2 to 18 m (1 sigma).
+    """The whole drive with 50 s unaided from 100 s on, through a turn; to half a percent of the largest element.
 
     With bias states, or with the noise of another grade, the filter would be sure of its position otherwise.
     """
@@ -234,7 +234,7 @@ def test_the_nine_states_follow_from_the_motion(process_noise):
     ],
 )
 def test_fidelities_agree_on_common_noise(options, out):
-    """Under a ramp of 1 m/s to the east, through both turns, and with 40 fixes left out: 2 cm and 20 cm as elsewhere."""
+    """Under a ramp of 1 m/s to the east, through both turns, and with 40 fixes left out: 2 cm and 20 cm."""
     error, whitened, nis, _ = fidelities.play(
         make_scenario("foi-drive" + options), Ramp(1.0), excludes=len(out) > 0, out=out
     )

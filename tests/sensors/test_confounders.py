@@ -104,13 +104,20 @@ def test_multipath_is_white_noise_of_its_sigma(dimension):
 
 
 def test_the_sigma_of_a_burst_is_uniform():
-    """Over the noise that the same numbers make with 1 m; Dvoretzky-Kiefer-Wolfowitz, false-failure 1e-8."""
+    """Over the noise that the same numbers make with 1 m; Dvoretzky-Kiefer-Wolfowitz, and correlations with place and
+    length (normal with 1 / √n), false-failure probability 1e-8 each.
+    """
     unit = Disturbances(outage_share=0.0, multipath_share=1.0, multipath_sigma=(1.0, 1.0))
-    noise, ones = drawn(BURSTS).noise, drawn(unit).noise
+    confounders, ones = drawn(BURSTS), drawn(unit).noise
+    noise = confounders.noise
     sigma = np.linalg.norm(noise, axis=(1, 2)) / np.linalg.norm(ones, axis=(1, 2))
     np.testing.assert_allclose(noise, sigma[:, None, None] * ones, rtol=1e-12)
     band = np.sqrt(np.log(2.0 / FALSE_FAILURE) / (2.0 * RUNS))
     assert stats.kstest(sigma, stats.uniform(3.0, 5.0).cdf).statistic < band
+    first, length = stretches(confounders.multipath)
+    whole = first + 20 <= 231
+    correlation = np.corrcoef([sigma[whole], first[whole], length[whole]])[np.triu_indices(3, 1)]
+    assert np.abs(correlation).max() < stats.norm.isf(FALSE_FAILURE / 2) / np.sqrt(whole.sum())
 
 
 def test_there_is_always_a_fix_at_epoch_0():
