@@ -51,18 +51,20 @@ PUBLISHED = (
 )
 """The responses of the literature and of two autopilots, which follow their own gates instead of an alarm."""
 
-GRID_DETECTORS = ("windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
-GRID_DEPTHS = (0, 5, 10, 20, 50)
-GRID_REUSES = (0, 5)
+GRID_DETECTORS = ("windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
+GRID_DEPTHS = (0, 10, 20, 50)
+GRID_REUSES = (0, 5, 12)
 """The grid that classical defenders are tuned on: detector x depth (or the estimated onset) x epochs until re-use."""
 
 
 TUNED = {
     "foi-drive": [
-        ClassicalDefender(
-            "tuned-depth", "signed-mean:n=10", "exclude-and-backtrack:20,reuse=5", True
-        ),
-        ClassicalDefender("tuned-onset", "signed-mean:n=10", "onset-depth:reuse=5", True),
+        ClassicalDefender("tuned-depth", "signed-mean:n=5", "exclude-and-backtrack:10,reuse=12", True),
+        ClassicalDefender("tuned-onset", "signed-mean:n=5", "onset-depth:reuse=12", True),
+    ],
+    "liu-flight:horizon=250,imu=tactical": [
+        ClassicalDefender("tuned-depth", "signed-mean:n=5", "exclude-and-backtrack:50,reuse=12", True),
+        ClassicalDefender("tuned-onset", "signed-mean:n=10", "onset-depth:reuse=12", True),
     ],
 }
 """The best of the grid on 4,000 games of each scenario's training attacks, as ``python -m train.tune`` finds them."""

@@ -23,7 +23,7 @@ import numpy as np
 
 import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.envs.config import SpooferConfig
-from spoofgym.envs.vector import SpooferVectorEnv
+from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
 
 SECONDS = 1.0
 ROUNDS = 3
@@ -84,6 +84,45 @@ def single_rate(environment: gym.Env[Any, Any], play: str) -> float:
     result = rate(step)
     environment.close()
     return result
+
+
+def defender_rate(threads: int) -> float:
+    """Steps per second of Defender-v0 with a covariance per run while nobody backtracks, every fix used."""
+    environment = DefenderVectorEnv(1024, threads=threads)
+    environment.reset(seed=0)
+    use = np.zeros((1024, 2), dtype=np.int64)
+
+    def step() -> int:
+        environment.step(use)
+        return 1024
+
+    return rate(step)
+
+
+def backtrack_epochs(depth: int) -> float:
+    """Cost of taking ``depth`` epochs back, in ordinary epochs of the navigator (propagate, innovate, update)."""
+    from spoofgym.navigation.interface import Decision, Demands
+    from spoofgym.scenarios import make_scenario
+    from spoofgym.simulation import Simulation
+
+    runs = 1024
+    simulation = Simulation(make_scenario("foi-drive"), None, (), None, runs, 0, demands=Demands(True, 60))
+    simulation.reset()
+    use, nothing = Decision(np.ones(runs, dtype=bool)), np.zeros((runs, 3))
+    back = Decision(np.zeros(runs, dtype=bool), backtrack=np.full(runs, depth))
+    navigator = simulation.navigator
+    ordinary, deep = [], []
+    for _ in range(200):
+        begin = time.perf_counter()
+        navigator.resolve(use)
+        navigator.propagate()
+        navigator.innovate(nothing)
+        ordinary.append(time.perf_counter() - begin)
+        if navigator.index[0] >= 60 and navigator.index[0] % 20 == 0:
+            begin = time.perf_counter()
+            navigator.resolve(back)
+            deep.append(time.perf_counter() - begin)
+    return float(np.median(deep) / np.median(ordinary))
 
 
 def learner_rate() -> float:
@@ -151,6 +190,8 @@ def measure() -> Iterable[dict[str, Any]]:
         for play in ("random", "ramp"):
             environment = SpooferVectorEnv(1024, on_alarm="respond", threads=threads)
             yield _row(play, "linear", "vector", 1024, threads, "own", vector_rate(environment, play))
+    for threads in (1, 2):
+        yield _row("defender, use", "linear", "vector", 1024, threads, "own", defender_rate(threads))
     yield _row("SB3 PPO, update included", "linear", "vector", 256, 2, "shared", learner_rate())
 
 
@@ -167,12 +208,16 @@ def main() -> int:
             f"{row['threads']} threads  {row['gains']:<7}{row['steps_per_second']:>12,.0f} steps/s"
         )
         print(line, file=sys.stderr if options.json == "-" else sys.stdout, flush=True)
+    back = {depth: backtrack_epochs(depth) for depth in (5, 10, 20, 50)}
     with_package, without = import_seconds()
     report = {
         "schema_version": 1,
         "rows": rows,
+        "backtrack_epochs": back,
         "import": {"spoofgym_seconds": with_package, "dependencies_seconds": without},
     }
+    line = "backtrack, in ordinary epochs: " + ", ".join(f"{cost:.1f} for {depth}" for depth, cost in back.items())
+    print(line, file=sys.stderr if options.json == "-" else sys.stdout)
     line = f"import spoofgym: {with_package - without:.2f} s beyond its dependencies ({with_package:.2f} s in all)"
     print(line, file=sys.stderr if options.json == "-" else sys.stdout)
     if options.json == "-":

@@ -135,6 +135,7 @@ class SimulatedScenario(Scenario):
         drag_off_rate: largest rate of the spoofed position per axis, m/s.
         error_scale: metres of error that make a spoofer's reward of 1.
         defender_scale: metres of error that cost a defender 1.
+        depth_table: depths among which a defender chooses, epochs.
         true_position_random_walk: what really acts on the INS position, m/√s.
     """
 
@@ -149,6 +150,7 @@ class SimulatedScenario(Scenario):
     error_scale: float
     true_position_random_walk: float
     defender_scale: float = 10.0
+    depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
 
     def __post_init__(self) -> None:
         if self.horizon < 1:

@@ -25,13 +25,13 @@ from stable_baselines3 import PPO
 from agents.learned import CONFIG_FILE, POLICY_FILE
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
-from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario
 from train.arguments import count, seed_number
 from train.defender_ppo import Settings, begin, environment_arguments, export, make_learner
-from train.ppo import CHECKPOINT_FILE, load_checkpoint, save_checkpoint
+from train.ppo import CHECKPOINT_FILE, load_checkpoint, read_config, save_checkpoint
 from train.watch import Watch, mean_return
 
 DEFAULT_STEPS = 3_200_000
@@ -55,7 +55,7 @@ def parser() -> argparse.ArgumentParser:
     add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
     add("--out", type=Path, default=Path("runs/defender"), help="run folder (default: %(default)s)")
     add("--threads", type=count, default=1, help="of the learner and the simulation (default: %(default)s)")
-    add("--resume", action="store_true", help="go on from the checkpoint in the run folder")
+    add("--resume", action="store_true", help="go on from the checkpoint in the run folder, with its settings")
     for name, value in asdict(Settings()).items():
         kind: Any = _switch if isinstance(value, bool) else type(value)
         add(f"--{name.replace('_', '-')}", type=kind, default=value, help=argparse.SUPPRESS)
@@ -81,20 +81,29 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     torch.set_num_threads(options.threads)
     try:
-        config = DefenderConfig(
-            scenario=options.scenario,
-            attacks=options.attacks,
-            detectors=tuple(options.detector or DETECTORS),
-            fidelity=options.fidelity,
-            threads=options.threads,
-        )
-        settings = Settings(**{name: getattr(options, name) for name in asdict(Settings())})
+        if options.resume:
+            content = read_config(folder)
+            config = configure(DefenderConfig, content["environment"] | {"threads": options.threads})
+            config = replace(config, detectors=tuple(config.detectors))  # type: ignore[arg-type]
+            settings, seed = Settings(**content["learner"]), int(content["seed"])
+        else:
+            config = DefenderConfig(
+                scenario=options.scenario,
+                attacks=options.attacks,
+                detectors=tuple(options.detector or DETECTORS),
+                fidelity=options.fidelity,
+                threads=options.threads,
+            )
+            settings = Settings(**{name: getattr(options, name) for name in asdict(Settings())})
+            seed = options.seed
         folder.mkdir(parents=True, exist_ok=True)
-        training = Training(config, settings, options.seed, options.steps, folder, console)
-    except (ValueError, TypeError) as error:
+        training = Training(config, settings, seed, options.steps, folder, console)
+        if options.resume:
+            training.resume()
+    except (ValueError, TypeError, RuntimeError) as error:
         console.print(f"error: {error}", style="red", markup=False)
         return 2
-    return training.run(options.resume)
+    return training.run()
 
 
 class Training:
@@ -103,7 +112,7 @@ class Training:
     def __init__(
         self, config: DefenderConfig, settings: Settings, seed: int, steps: int, folder: Path, console: Console
     ) -> None:
-        """Build the learner and write down what is trained."""
+        """Build the learner."""
         self._config, self._settings, self._seed, self._steps = config, settings, seed, steps
         self._folder, self._console = folder, console
         self._learner = make_learner(config, settings, seed, folder)
@@ -116,20 +125,22 @@ class Training:
         )
         self._validation: list[dict[str, float]] = []
         self._watch = Watch(steps, console, self._result, self._keep)
-        content = {
-            "environment": environment_arguments(config),
-            "learner": asdict(settings),
-            "seed": seed,
-            "steps": steps,
-        }
-        (folder / CONFIG_FILE).write_text(json.dumps(content, indent=2) + "\n")
 
-    def run(self, resume: bool) -> int:
-        """Train, or go on from the checkpoint; returns the exit status."""
-        if resume:
-            load_checkpoint(self._learner, self._folder)
-            path = self._folder / VALIDATION_FILE
-            self._validation = json.loads(path.read_text()) if path.is_file() else []
+    def resume(self) -> None:
+        """Go on from the checkpoint in the run folder."""
+        load_checkpoint(self._learner, self._folder)
+        path = self._folder / VALIDATION_FILE
+        self._validation = json.loads(path.read_text()) if path.is_file() else []
+
+    def run(self) -> int:
+        """Train to the end; returns the exit status."""
+        content = {
+            "environment": environment_arguments(self._config),
+            "learner": asdict(self._settings),
+            "seed": self._seed,
+            "steps": self._steps,
+        }
+        (self._folder / CONFIG_FILE).write_text(json.dumps(content, indent=2) + "\n")
         started, before, interrupted = time.perf_counter(), self._learner.num_timesteps, False
         self._watch.start()
         try:
@@ -146,7 +157,8 @@ class Training:
         finally:
             self._watch.stop()
         save_checkpoint(self._learner, self._folder)
-        if not interrupted or not (self._folder / POLICY_FILE).is_file():
+        validated = self._validation[-1]["steps"] if self._validation else -1
+        if validated < self._learner.num_timesteps and not (interrupted and (self._folder / POLICY_FILE).is_file()):
             self._keep(self._learner)
         played, seconds = self._learner.num_timesteps - before, time.perf_counter() - started
         self._console.print(

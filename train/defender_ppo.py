@@ -30,6 +30,7 @@ from spoofgym.envs.vector import DefenderVectorEnv
 from train.imitation import imitate
 from train.ppo import LAST_RATE, arrays
 
+TEACHING_LANES = 256
 EXCLUDING_FIELD = "last decision was to exclude"
 
 
@@ -59,10 +60,10 @@ class Settings:
     clean: float = 0.1
     minibatches: int = 8
     epochs: int = 6
-    learning_rate: float = 1.5e-3
+    learning_rate: float = 5e-4
     gamma: float = 0.99
     gae_lambda: float = 0.95
-    clip_range: float = 0.2
+    clip_range: float = 0.15
     entropy: float = 0.0
     hidden: int = 64
     imitate: bool = True
@@ -212,8 +213,8 @@ def lanes(config: DefenderConfig, settings: Settings) -> DefenderVectorEnv:
 
 
 def begin(learner: PPO, config: DefenderConfig, settings: Settings, seed: int) -> None:
-    """Teach the policy the classical defender's actions, then the critic that policy's returns."""
-    imitate(learner, lanes(config, settings), seed)
+    """Teach the policy a classical defender's actions, then the critic that policy's returns."""
+    imitate(learner, lanes(config, replace(settings, lanes=TEACHING_LANES)), seed)
     policy = learner.policy
     actor = [*policy.mlp_extractor.policy_net.parameters(), *policy.action_net.parameters()]
     for parameter in actor:

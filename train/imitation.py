@@ -1,12 +1,15 @@
 """A classical defender in the seat of a learner: what it would do is what a policy begins with.
 
-In every lane of Defender-v0 the features say whether a classical defender would exclude (a signed mean of 10 epochs,
-until 5 fixes in a row agree) and how far back it would go (the estimated onset plus a margin, rounded up to the depth
-table). A policy that is first taught to do that starts where the best classical defenders stand, and what
-reinforcement adds is its own.
+In every lane of Defender-v0 the features say whether a classical defender would exclude (a signed mean of 5 epochs,
+until 5 fixes in a row agree) and when it believes that the attack began. A teacher excludes where they say so, perhaps
+until more fixes agree, and goes back either to the estimated onset plus a margin, rounded up to the depth table, or a
+fixed depth; of all these the one that earns most on games of the training population is taken. A policy that is first
+taught to do that starts where the best classical defenders stand, and what reinforcement adds is its own.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -20,6 +23,7 @@ from spoofgym.responses.onset_depth import DEFAULT_MARGIN
 
 GAMES = 4
 """Games of every lane that a policy is taught from."""
+REUSES = (5, 12)
 PASSES = 30
 MINIBATCH = 4096
 LEARNING_RATE = 2e-3
@@ -27,20 +31,52 @@ STRAY = 0.02
 """Share of decisions in which the classical defender is made to do the other thing, so that what follows is seen."""
 
 
-def classical_action(game: DefenderGame) -> NDArray[np.int64]:
-    """What a classical defender would do in the present epoch, (N, 2)."""
-    depth = game.features.onset_depth + DEFAULT_MARGIN
-    place = np.minimum(np.searchsorted(game.depths, depth), len(game.depths) - 1)
-    return np.stack([game.features.suspicion.astype(np.int64), place], axis=1)
+@dataclass(frozen=True)
+class Teacher:
+    """A classical defender that acts by the features of Defender-v0.
+
+    Attributes:
+        depth: place in the depth table; None = the estimated onset.
+        reuse: fixes in a row that agree before GNSS is used again; 5 or more.
+    """
+
+    depth: int | None
+    reuse: int
+
+    def act(self, game: DefenderGame) -> NDArray[np.int64]:
+        """What it does in the present epoch, (N, 2)."""
+        features = game.features
+        if self.depth is None:
+            place = np.searchsorted(game.depths, features.onset_depth + DEFAULT_MARGIN)
+            place = np.minimum(place, len(game.depths) - 1)
+        else:
+            place = np.full(game.num_lanes, self.depth)
+        exclude = features.suspicion | (game.excluding & (features.agreeing < self.reuse))
+        return np.stack([exclude.astype(np.int64), place], axis=1)
 
 
-def examples(vector: DefenderVectorEnv, seed: int) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Observations (n, D) of games that the classical defender plays, and its actions (n, 2)."""
+def best_teacher(vector: DefenderVectorEnv, seed: int) -> Teacher:
+    """The one that earns most on common games."""
+    earned: dict[Teacher, float] = {}
+    for depth in (None, *range(len(vector.game.depths))):
+        for reuse in REUSES:
+            teacher = Teacher(depth, reuse)
+            vector.reset(seed=seed)
+            earned[teacher] = 0.0
+            for _ in range(GAMES * vector.game.scenario.timeline.num_epochs):
+                earned[teacher] += float(vector.step(teacher.act(vector.game))[1].sum())
+    return max(earned, key=lambda teacher: earned[teacher])
+
+
+def examples(
+    vector: DefenderVectorEnv, teacher: Teacher, seed: int
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Observations (n, D) of games that a teacher plays, and its actions (n, 2)."""
     rng = np.random.default_rng(seed)
     observation, _ = vector.reset(seed=seed)
     observations, actions = [], []
     for _ in range(GAMES * vector.game.scenario.timeline.num_epochs):
-        action = classical_action(vector.game)
+        action = teacher.act(vector.game)
         observations.append(observation)
         actions.append(action)
         strayed = action.copy()
@@ -51,14 +87,14 @@ def examples(vector: DefenderVectorEnv, seed: int) -> tuple[NDArray[np.float32],
 
 
 def imitate(learner: PPO, vector: DefenderVectorEnv, seed: int) -> float:
-    """Teach the learner's policy the classical defender's actions; the share of its decisions that then agree.
+    """Teach the learner's policy the best teacher's actions; the share of its decisions that then agree.
 
     Args:
         learner: whose policy is changed, not its critic.
         vector: lanes of the learner's game, whose streams go on from ``seed``.
         seed: of the games and of the order of the examples.
     """
-    observations, actions = examples(vector, seed)
+    observations, actions = examples(vector, best_teacher(vector, seed), seed)
     inputs, labels = torch.as_tensor(observations), torch.as_tensor(actions)
     extractor, head = learner.policy.mlp_extractor, learner.policy.action_net
     optimizer = torch.optim.Adam([*extractor.policy_net.parameters(), *head.parameters()], lr=LEARNING_RATE)

@@ -108,6 +108,19 @@ def write_config(folder: Path, config: SpooferConfig, settings: Settings, seed: 
     (folder / CONFIG_FILE).write_text(json.dumps(content, indent=2) + "\n")
 
 
+def read_config(folder: Path) -> dict[str, Any]:
+    """What ``config.json`` of a run folder says: environment, learner, seed and steps.
+
+    Raises:
+        ValueError: it is missing or damaged.
+    """
+    try:
+        content = json.loads((folder / CONFIG_FILE).read_text())
+        return {key: content[key] for key in ("environment", "learner", "seed", "steps")}
+    except (OSError, KeyError, json.JSONDecodeError) as error:
+        raise ValueError(f"{folder / CONFIG_FILE} cannot be read: {error!r}") from error
+
+
 def export(learner: PPO, config: SpooferConfig, folder: Path) -> LearnedSpoofer:
     """The learner's policy as plain arrays, also written into ``folder``."""
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]

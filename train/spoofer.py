@@ -21,10 +21,19 @@ from rich.console import Console
 from stable_baselines3 import PPO
 
 from agents.learned import CONFIG_FILE
-from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig
+from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig, configure
 from spoofgym.scenario import FIDELITIES
 from train.arguments import count, seed_number
-from train.ppo import CHECKPOINT_FILE, Settings, export, load_checkpoint, make_learner, save_checkpoint, write_config
+from train.ppo import (
+    CHECKPOINT_FILE,
+    Settings,
+    export,
+    load_checkpoint,
+    make_learner,
+    read_config,
+    save_checkpoint,
+    write_config,
+)
 from train.watch import Watch, mean_return
 
 DEFAULT_STEPS = 3_200_000
@@ -45,7 +54,7 @@ def parser() -> argparse.ArgumentParser:
     add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
     add("--out", type=Path, default=Path("runs/spoofer"), help="run folder (default: %(default)s)")
     add("--threads", type=count, default=1, help="of the learner and the simulation (default: %(default)s)")
-    add("--resume", action="store_true", help="go on from the checkpoint in the run folder")
+    add("--resume", action="store_true", help="go on from the checkpoint in the run folder, with its settings")
     return result
 
 
@@ -62,22 +71,29 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     torch.set_num_threads(options.threads)
     try:
-        config = SpooferConfig(
-            scenario=options.scenario,
-            detector=options.detector,
-            knowledge=options.knowledge,
-            action=options.action,
-            fidelity=options.fidelity,
-            threads=options.threads,
-        )
+        if options.resume:
+            content = read_config(folder)
+            config = configure(SpooferConfig, content["environment"] | {"threads": options.threads})
+            settings, seed = Settings(**content["learner"]), int(content["seed"])
+        else:
+            config = SpooferConfig(
+                scenario=options.scenario,
+                detector=options.detector,
+                knowledge=options.knowledge,
+                action=options.action,
+                fidelity=options.fidelity,
+                threads=options.threads,
+            )
+            settings, seed = Settings(), options.seed
         folder.mkdir(parents=True, exist_ok=True)
-        settings = Settings()
-        learner = make_learner(config, settings, options.seed, folder)
-    except (ValueError, TypeError) as error:
+        learner = make_learner(config, settings, seed, folder)
+        if options.resume:
+            load_checkpoint(learner, folder)
+    except (ValueError, TypeError, RuntimeError) as error:
         console.print(f"error: {error}", style="red", markup=False)
         return 2
-    write_config(folder, config, settings, options.seed, options.steps)
-    training = Training(config, settings, options.seed, options.steps, folder, console, learner)
+    write_config(folder, config, settings, seed, options.steps)
+    training = Training(config, settings, seed, options.steps, folder, console, learner)
     return training.run(options.resume)
 
 
@@ -103,9 +119,7 @@ class Training:
         )
 
     def run(self, resume: bool) -> int:
-        """Train, or go on from the checkpoint; returns the exit status."""
-        if resume:
-            load_checkpoint(self._learner, self._folder)
+        """Train to the end, after trials where this is no resumed run; returns the exit status."""
         begin = time.perf_counter()
         before = self._learner.num_timesteps
         interrupted = False

@@ -37,7 +37,8 @@ class DefenderEnv(SingleEnv):
     `MultiDiscrete([2, D])`.
 
     - First: 0 = use the fix of the present epoch, 1 = exclude it. A fix that the receiver does not give is never used.
-    - Second: place in the scenario's depth table, (0, 5, 10, 20, 50) epochs by default (D = 5). It is read only where
+    - Second: place in the scenario's depth table: (0, 3, 5, 8, 12, 16, 20, 25, 30, 40, 50) epochs on the drive (D =
+      11), (0, 5, 10, 20, 50) elsewhere. It is read only where
       the last decision was to use and this one is to exclude, and it is the number of epochs before the present one
       whose fixes are taken back. A backtrack no deeper than the present coast does nothing, for there is no fix to take
       back; one deeper than the history is cut. Both are told in `info`.
@@ -69,26 +70,27 @@ class DefenderEnv(SingleEnv):
     | 16 | score of the onset estimate | 1 | 20 |
     | 17 | suspicion | 1 | not squashed |
     | 18 | quiet fixes since the suspicion | epochs | 5 |
-    | 19 | GNSS available | 1 | not squashed |
-    | 20 | last decision was to exclude | 1 | not squashed |
-    | 21 | coasting time | s | 20 |
-    | 22 | predicted position sigma | m | 10 |
-    | 23 | speed | m/s | 50 |
-    | 24 | acceleration | m/s² | 1 |
-    | 25 | gyro bias right over its data sheet | 1 | 1 |
-    | 26 | gyro bias forward over its data sheet | 1 | 1 |
-    | 27 | gyro bias up over its data sheet | 1 | 1 |
-    | 28 | accelerometer bias right over its data sheet | 1 | 1 |
-    | 29 | accelerometer bias forward over its data sheet | 1 | 1 |
-    | 30 | accelerometer bias up over its data sheet | 1 | 1 |
-    | 31 | elapsed fraction of the game | 1 | not squashed |
+    | 19 | fixes in a row that agree, in exclusion | epochs | 10 |
+    | 20 | GNSS available | 1 | not squashed |
+    | 21 | last decision was to exclude | 1 | not squashed |
+    | 22 | coasting time | s | 20 |
+    | 23 | predicted position sigma | m | 10 |
+    | 24 | speed | m/s | 50 |
+    | 25 | acceleration | m/s² | 1 |
+    | 26 | gyro bias right over its data sheet | 1 | 1 |
+    | 27 | gyro bias forward over its data sheet | 1 | 1 |
+    | 28 | gyro bias up over its data sheet | 1 | 1 |
+    | 29 | accelerometer bias right over its data sheet | 1 | 1 |
+    | 30 | accelerometer bias forward over its data sheet | 1 | 1 |
+    | 31 | accelerometer bias up over its data sheet | 1 | 1 |
+    | 32 | elapsed fraction of the game | 1 | not squashed |
 
     - Signed means are those of the whitened horizontal innovations, times the root of their number, so that each axis
       is standard normal where the filter is matched and nobody attacks. The score of the onset estimate is the largest
       |sum of the last n|² / n, n up to 50, and the estimate is that n (`spoofgym.responses.onset`).
-    - Suspicion is what a classical defender believes: it rises when the squared signed mean of 10 epochs exceeds its
+    - Suspicion is what a classical defender believes: it rises when the squared signed mean of 5 epochs exceeds its
       1e-3 quantile (chi-square, 2 degrees of freedom) and is dropped after 5 quiet fixes in a row, whose NIS lies below
-      its own 1e-3 quantile.
+      its own 1e-3 quantile. Entry 19 counts such fixes on while the defender itself excludes.
     - Estimates of velocity, position sigma and biases are the filter's own, before the fix of the epoch. The scale of
       what is measured in metres is the scenario's `defender_scale`.
     - In an outage the innovations are zero, and nothing but the last decision tells a coast by choice.

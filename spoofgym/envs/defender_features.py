@@ -45,6 +45,7 @@ def defender_fields(
         Field("score of the onset estimate", "1", 20.0),
         Field("suspicion", "1", 0.0),
         Field("quiet fixes since the suspicion", "epochs", 5.0),
+        Field("fixes in a row that agree, in exclusion", "epochs", 10.0),
         Field("GNSS available", "1", 0.0),
         Field("last decision was to exclude", "1", 0.0),
         Field("coasting time", "s", 20.0),
@@ -65,6 +66,7 @@ class DefenderFeatures:
         fields: the entries, in order.
         suspicion: whether a classical defender would exclude, (N,).
         onset_depth: epochs since the estimated onset, (N,).
+        agreeing: fixes in a row that agree with the coasting filter while the defender excludes, (N,).
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class DefenderFeatures:
         self.onset_depth = np.zeros(num_lanes, dtype=np.int64)
         self._old_alarm = np.zeros(num_lanes, dtype=bool)
         self._quiet = np.zeros(num_lanes, dtype=np.int64)
+        self.agreeing = np.zeros(num_lanes, dtype=np.int64)
         self._raw = np.zeros((num_lanes, len(self.fields)))
         self._quiet_nis, self._quiet_mean = quantile(QUIET_P, scenario.dimension), quantile(QUIET_P, 2)
         self._interval, self._horizon = scenario.timeline.interval, scenario.timeline.num_epochs
@@ -93,7 +96,8 @@ class DefenderFeatures:
         """Forget the games of these lanes."""
         self._onset.reset(lanes)
         self._means[lanes], self._residual[lanes], self._velocity[lanes] = 0.0, 0.0, np.nan
-        self.suspicion[lanes], self._old_alarm[lanes], self._quiet[lanes] = False, False, 0
+        self.suspicion[lanes], self._old_alarm[lanes] = False, False
+        self._quiet[lanes], self.agreeing[lanes] = 0, 0
 
     def update(self, excluding: Flags, coast: Runs, lanes: Runs) -> None:
         """See the present epoch of these lanes.
@@ -138,6 +142,7 @@ class DefenderFeatures:
             self.suspicion,
             self._old_alarm,
             self._quiet,
+            self.agreeing,
             self._raw,
         )
 
@@ -174,6 +179,7 @@ def _fill(
     suspicion: Flags,
     old_alarm: Flags,
     quiet: Runs,
+    agreeing: Runs,
     raw: Floats,
 ) -> None:
     """Write the raw entries of lanes, in the order of `defender_fields`, and keep what the next epoch compares with."""
@@ -196,16 +202,21 @@ def _fill(
             if available[lane]:
                 last_residual[lane, a] = residual[lane, a]
         place += 4
+        if not excluding[lane]:
+            agreeing[lane] = 0
+        elif available[lane]:
+            agreeing[lane] = agreeing[lane] + 1 if nis[lane] < quiet_nis else 0
         if available[lane]:
             _suspect(lane, square > quiet_mean, nis[lane] < quiet_nis, suspicion, old_alarm, quiet)
         row[place] = depth[lane]
         row[place + 1] = score[lane]
         row[place + 2] = 1.0 if suspicion[lane] else 0.0
         row[place + 3] = quiet[lane]
-        row[place + 4] = 1.0 if available[lane] else 0.0
-        row[place + 5] = 1.0 if excluding[lane] else 0.0
-        row[place + 6] = coast[lane]
-        row[place + 7] = np.sqrt(covariance[lane, 0, 0] + covariance[lane, 1, 1])
+        row[place + 4] = agreeing[lane]
+        row[place + 5] = 1.0 if available[lane] else 0.0
+        row[place + 6] = 1.0 if excluding[lane] else 0.0
+        row[place + 7] = coast[lane]
+        row[place + 8] = np.sqrt(covariance[lane, 0, 0] + covariance[lane, 1, 1])
         speed = 0.0
         change = 0.0
         for a in range(3):
@@ -213,9 +224,9 @@ def _fill(
             if index[lane] > 0:
                 change += (velocity[lane, a] - last_velocity[lane, a]) ** 2
             last_velocity[lane, a] = velocity[lane, a]
-        row[place + 8] = np.sqrt(speed)
-        row[place + 9] = np.sqrt(change) / interval
-        place += 10
+        row[place + 9] = np.sqrt(speed)
+        row[place + 10] = np.sqrt(change) / interval
+        place += 11
         for a in range(6):
             row[place + a] = bias[lane, a] / bias_sigma[a]
         row[place + 6] = index[lane] / horizon
@@ -226,7 +237,7 @@ def _signed_means(ring: Floats, index: int, whitened: Floats, row: Floats) -> fl
     """Put the newest horizontal innovation into its ring (10, 2) and write √n times the means of 5 and 10 epochs, (4,).
 
     Returns:
-        The square of the longer one, chi-square with 2 degrees of freedom under a matched filter.
+        The square of the shorter one, chi-square with 2 degrees of freedom under a matched filter.
     """
     for a in range(2):
         ring[index % LONG, a] = whitened[a]
@@ -239,7 +250,7 @@ def _signed_means(ring: Floats, index: int, whitened: Floats, row: Floats) -> fl
                 short += value
         row[a] = short / np.sqrt(SHORT)
         row[2 + a] = long / np.sqrt(LONG)
-    return row[2] ** 2 + row[3] ** 2
+    return row[0] ** 2 + row[1] ** 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

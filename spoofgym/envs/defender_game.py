@@ -108,7 +108,7 @@ class DefenderGame:
             num_lanes,
             fidelity=config.fidelity,
             threads=config.threads,
-            demands=Demands(excludes=True, history=int(self.depths.max())),
+            demands=Demands(excludes=True, history=max(scenario.history, int(self.depths.max()))),
             confounders=self.confounders,
         )
         self.features = DefenderFeatures(scenario, self.simulation, names, num_lanes)

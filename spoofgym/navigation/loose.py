@@ -251,7 +251,8 @@ class StrapdownNavigator:
     def _backtrack_slice(self, runs: Runs) -> None:
         """Restore the state after epoch k - n - 1 and carry it to epoch k; runs join in when their depth is reached."""
         depth = self.backtracked[runs]
-        for left in range(int(depth.max(initial=0)), -1, -1):
+        deepest = int(depth.max(initial=0))
+        for left in range(deepest, -1, -1):
             joining = runs[depth == left]
             if left and len(joining):
                 slot = (self.index[joining] - left) % (self.history + 1)
@@ -259,7 +260,7 @@ class StrapdownNavigator:
                     part[joining] = ring[joining, slot]
                 self.index[joining] -= left + 1
             active = runs[depth >= left]
-            if left < depth.max():
+            if left < deepest:
                 self._keep(active[depth[depth >= left] > left])
             self._mechanize(active, self.auxiliary[:, :0])
 

@@ -43,6 +43,9 @@ STANDSTILL = 0.01
 
 RECEIVERS = ("white", "foi")
 
+DEPTHS = (0, 3, 5, 8, 12, 16, 20, 25, 30, 40, 50)
+"""Depth table: with the five depths of other scenarios a defender that estimates the onset loses 7 % by rounding."""
+
 
 @lru_cache(maxsize=1)
 def foi_trajectory() -> Trajectory:
@@ -110,6 +113,7 @@ def foi_drive(
         onset=onset,
         horizon=horizon,
         drag_off_rate=(4.0, 4.0, 4.0),
+        depth_table=DEPTHS,
         error_scale=10.0,
         defender_scale=10.0,
         true_position_random_walk=0.0,

@@ -50,7 +50,7 @@ def test_checkers_of_gymnasium_and_sb3(arguments: dict[str, Any]) -> None:
 
 def test_action_space_and_horizon() -> None:
     env = make()
-    assert env.action_space == gym.spaces.MultiDiscrete([2, 5])
+    assert env.action_space == gym.spaces.MultiDiscrete([2, 11])
     env.reset(seed=0)
     for k in range(1, 61):
         _, _, terminated, truncated, info = env.step(np.array([USE, 0]))
@@ -72,20 +72,20 @@ def play(actions: list[tuple[int, int]], seed: int = 3, **arguments: Any) -> lis
 
 
 def test_depth_is_read_only_where_exclusion_begins() -> None:
-    """Depth 10 (place 2) at epoch 30, ignored at 31, where GNSS is left out already; place 1 of use is ignored, too."""
-    actions = [(USE, 1)] * 30 + [(EXCLUDE, 2), (EXCLUDE, 4), (USE, 4), (EXCLUDE, 1)]
+    """Depth 12 (place 4) at epoch 30, ignored at 31, where GNSS is left out already; place 1 of use is ignored, too."""
+    actions = [(USE, 1)] * 30 + [(EXCLUDE, 4), (EXCLUDE, 6), (USE, 6), (EXCLUDE, 2)]
     infos = play(actions, attacks="none", outage=0.0, multipath=0.0)
-    assert [info["backtrack_asked"] for info in infos[28:35]] == [0, 0, 10, 0, 0, 5, 0]
-    assert [info["backtrack"] for info in infos[28:35]] == [0, 0, 10, 0, 0, 5, 0]
+    assert [info["backtrack_asked"] for info in infos[28:35]] == [0, 0, 12, 0, 0, 5, 0]
+    assert [info["backtrack"] for info in infos[28:35]] == [0, 0, 12, 0, 0, 5, 0]
     assert [info["coast"] for info in infos[28:35]] == [0, 0, 1, 2, 0, 1, 0]
     assert [info["used"] for info in infos[28:35]] == [True, True, False, False, True, False, True]
 
 
 def test_a_backtrack_is_that_of_the_simulation() -> None:
-    """After it the errors are those of a game in which the fixes had been left out from ten epochs before on."""
+    """After it the errors are those of a game in which the fixes had been left out from 12 epochs before on."""
     quiet: dict[str, Any] = {"attacks": RAMP, "clean": 0.0, "outage": 0.0, "multipath": 0.0}
-    back = play([(USE, 0)] * 30 + [(EXCLUDE, 2)] * 10, **quiet)
-    out = play([(USE, 0)] * 20 + [(EXCLUDE, 0)] * 20, **quiet)
+    back = play([(USE, 0)] * 30 + [(EXCLUDE, 4)] * 10, **quiet)
+    out = play([(USE, 0)] * 18 + [(EXCLUDE, 0)] * 22, **quiet)
     late = play([(USE, 0)] * 30 + [(EXCLUDE, 0)] * 10, **quiet)
     assert [info["error"] for info in back[30:]] == [info["error"] for info in out[30:]]
     assert [info["error"] for info in back[:30]] == [info["error"] for info in late[:30]]
@@ -104,9 +104,9 @@ def test_a_backtrack_no_deeper_than_the_coast_does_nothing() -> None:
     for _ in range(lost + 8):
         *_, info = env.step(np.array([USE, 0]))
     assert info["coast"] == 8
-    *_, info = env.step(np.array([EXCLUDE, 1]))
+    *_, info = env.step(np.array([EXCLUDE, 2]))
     assert (info["backtrack_asked"], info["backtrack"]) == (5, 0)
-    infos = play([(USE, 0)] * 7 + [(EXCLUDE, 4)], attacks="none", outage=0.0)
+    infos = play([(USE, 0)] * 7 + [(EXCLUDE, 10)], attacks="none", outage=0.0)
     assert (infos[7]["backtrack_asked"], infos[7]["backtrack"]) == (50, 7)
 
 
@@ -122,7 +122,7 @@ def test_rewards_are_what_the_page_says() -> None:
             spoofed, there = bool(game.attacked[0]), bool(game.simulation.epoch.available[0])
             disturbed = bool(game.confounders.multipath[0, game.index[0]])
             assert clean == (there and not spoofed and not disturbed)
-            action = rng.integers([2, 5])
+            action = rng.integers([2, 11])
             _, reward, *_, info = env.step(action)
             kinds.add((clean, int(action[0])))
             terms = info["reward_terms"]
@@ -196,7 +196,7 @@ def test_observation_holds_what_its_fields_say() -> None:
         assert entry["predicted position sigma"] == pytest.approx(sigma, rel=1e-3)
         assert entry["coasting time"] == pytest.approx(env.game.coast[0], rel=1e-3)
         assert entry["elapsed fraction of the game"] == pytest.approx(k / 60, rel=1e-5)
-        action = rng.integers([2, 5])
+        action = rng.integers([2, 11])
         observation = env.step(action)[0]
         assert observation[names.index("last decision was to exclude")] == action[0]
 
@@ -215,7 +215,7 @@ def test_suspicion_is_that_of_the_classical_defender() -> None:
     simulation = Simulation(
         game.scenario,
         make_attack("training,clean=0.0"),
-        [make_detector("signed-mean:n=10,p_fa=1e-3")],
+        [make_detector("signed-mean:n=5,p_fa=1e-3")],
         make_response("exclude:reuse=5"),
         lanes,
         0,
@@ -276,8 +276,8 @@ def test_bad_arguments(arguments: dict[str, Any], error: type[Exception], messag
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        ([2, 0], r"\[0 or 1, 0 to 4\], got \[2 0\]"),
-        ([0, 5], r"\[0 or 1, 0 to 4\], got \[0 5\]"),
+        ([2, 0], r"\[0 or 1, 0 to 10\], got \[2 0\]"),
+        ([0, 11], r"\[0 or 1, 0 to 10\], got \[ 0 11\]"),
         ([-1, 0], "whole numbers"),
         ([0.5, 0], "whole numbers"),
         ([0], r"shape \(2,\), got \(1,\)"),
@@ -305,7 +305,7 @@ def test_a_frame_is_drawn() -> None:
 
 @pytest.mark.slow
 def test_a_sensible_classical_defender_beats_never_always_and_random() -> None:
-    """Mean error on 300 common games of the drive and of the tactical flight, by far more than chance.
+    """Mean error on 1500 common games of the drive and of the tactical flight, by far more than chance.
 
     Paired over games, the classical defender is better by more than 5 standard errors (false failure below 1e-6).
     """
@@ -314,18 +314,18 @@ def test_a_sensible_classical_defender_beats_never_always_and_random() -> None:
         rng = np.random.default_rng(0)
         for name in ("classical", "never", "always", "random"):
             vector = DefenderVectorEnv(
-                300, scenario=scenario, detectors="snapshot", autoreset_mode="Disabled", threads=2
+                1500, scenario=scenario, detectors="snapshot", autoreset_mode="Disabled", threads=2
             )
             vector.reset(seed=0)
             game = vector.game
             depth = int(np.searchsorted(game.depths, 20))
-            done = np.zeros(300, dtype=bool)
+            done = np.zeros(1500, dtype=bool)
             while not done.all():
                 if name == "random":
-                    action = rng.integers([2, 5], size=(300, 2))
+                    action = rng.integers([2, len(game.depths)], size=(1500, 2))
                 else:
                     exclude = {"never": 0, "always": 1, "classical": game.features.suspicion}[name]
-                    action = np.stack([exclude * np.ones(300), np.full(300, depth)], axis=1).astype(int)
+                    action = np.stack([exclude * np.ones(1500), np.full(1500, depth)], axis=1).astype(int)
                 *_, terminated, _, info = vector.step(action)
                 done |= terminated
             errors[name] = info["mean_error"]
