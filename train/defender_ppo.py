@@ -137,7 +137,7 @@ class DefenderPolicy(ActorCriticPolicy):
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor: Any = SlicedNetworks(self._width, self.features_dim, self._hidden)
 
-    def forward(  # type: ignore[override]
+    def forward(
         self, obs: torch.Tensor, deterministic: bool = False
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Actions, values and the probability of the actions."""

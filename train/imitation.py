@@ -3,7 +3,7 @@
 In every lane of Defender-v0 the features say whether a classical defender would exclude (a signed mean of 5 epochs,
 until 5 fixes in a row agree) and when it believes that the attack began. A teacher excludes where they say so, perhaps
 until more fixes agree, and goes back either to the estimated onset plus a margin, rounded up to the depth table, or a
-fixed depth; of all these the one that earns most on games of the training population is taken. A policy that is first
+fixed depth; of all these the one whose error is least on games of the training population is taken. A policy that is first
 taught to do that starts where the best classical defenders stand, and what reinforcement adds is its own.
 """
 
@@ -24,6 +24,8 @@ from spoofgym.responses.onset_depth import DEFAULT_MARGIN
 GAMES = 4
 """Games of every lane that a policy is taught from."""
 REUSES = (5, 12)
+TRIALS = 8
+"""Games of every lane in which teachers are compared."""
 PASSES = 30
 MINIBATCH = 4096
 LEARNING_RATE = 2e-3
@@ -56,16 +58,18 @@ class Teacher:
 
 
 def best_teacher(vector: DefenderVectorEnv, seed: int) -> Teacher:
-    """The one that earns most on common games."""
-    earned: dict[Teacher, float] = {}
+    """The one whose error is least on common games."""
+    error: dict[Teacher, float] = {}
     for depth in (None, *range(len(vector.game.depths))):
         for reuse in REUSES:
             teacher = Teacher(depth, reuse)
             vector.reset(seed=seed)
-            earned[teacher] = 0.0
-            for _ in range(GAMES * vector.game.scenario.timeline.num_epochs):
-                earned[teacher] += float(vector.step(teacher.act(vector.game))[1].sum())
-    return max(earned, key=lambda teacher: earned[teacher])
+            error[teacher] = 0.0
+            for _ in range(TRIALS * vector.game.scenario.timeline.num_epochs):
+                action = teacher.act(vector.game)
+                vector.step(action)
+                error[teacher] += float(vector.game.error.sum())
+    return min(error, key=lambda teacher: error[teacher])
 
 
 def examples(

@@ -154,7 +154,8 @@ def test_table_of_the_page_is_that_of_the_fields() -> None:
     lines = [line.strip() for line in (DefenderEnv.__doc__ or "").splitlines()]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("| ")]
     table = [row for row in rows if row[0].isdigit()]
-    fields = DefenderGame(DefenderConfig(detectors=("snapshot", "windowed:n=5,threshold=49", "windowed:threshold=114")), 1)
+    detectors = ("snapshot", "windowed:n=5,threshold=49", "windowed:threshold=114")
+    fields = DefenderGame(DefenderConfig(detectors=detectors), 1)
     names = [field.name for field in fields.fields]
     for place, name in ((4, "windowed:n=5"), (5, "windowed")):
         names[place] = f"statistic of {name} over its threshold"
@@ -246,7 +247,8 @@ def test_privileged_state_tells_the_truth_and_is_no_part_of_the_observation() ->
         game.step(np.tile([USE, 0], (8, 1)))
         state = game.privileged()
         east = state[:, names.index("position error east")]
-        np.testing.assert_allclose(10.0 * east / (1.0 - np.abs(east)), game.simulation.error[:, 0], rtol=1e-4, atol=1e-4)
+        metres = 10.0 * east / (1.0 - np.abs(east))
+        np.testing.assert_allclose(metres, game.simulation.error[:, 0], rtol=1e-4, atol=1e-4)
         np.testing.assert_array_equal(state[:, names.index("attack in force")] > 0, game.attacked)
     assert not set(names) & {field.name for field in game.fields}
 
