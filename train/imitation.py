@@ -3,8 +3,8 @@
 In every lane of Defender-v0 the features say whether a classical defender would exclude (a signed mean of 5 epochs,
 until 5 fixes in a row agree) and when it believes that the attack began. A teacher excludes where they say so, perhaps
 until more fixes agree, and goes back either to the estimated onset plus a margin, rounded up to the depth table, or a
-fixed depth; of all these the one whose error is least on games of the training population is taken. A policy that is first
-taught to do that starts where the best classical defenders stand, and what reinforcement adds is its own.
+fixed depth; of all these the one whose error is least on games of the training population is taken. A policy that is
+first taught to do that starts where the best classical defenders stand, and what reinforcement adds is its own.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,7 +73,7 @@ class DefenderFigure:
         rows = np.array(self._rows)
         self._figure.clear()
         upper = self._figure.add_axes((0.08, 0.52, 0.895, 0.34))
-        middle = self._figure.add_axes((0.08, 0.42, 0.895, 0.05), sharex=upper)
+        middle = self._figure.add_axes((0.08, 0.405, 0.895, 0.065), sharex=upper)
         lower = self._figure.add_axes((0.08, 0.105, 0.895, 0.255), sharex=upper)
         self._draw_error(upper, rows)
         self._draw_decisions(middle, rows)
@@ -113,6 +114,7 @@ class DefenderFigure:
 
     def _draw_decisions(self, axes: Any, rows: NDArray[np.float64]) -> None:
         interval = self._game.scenario.timeline.interval
+        heights = itertools.cycle((0.75, 0.25))  # one after the other may lie close together
         for place, (excluded, depth) in enumerate(self._decided):
             axes.axvspan(
                 rows[place, 0] - 0.5 * interval,
@@ -122,15 +124,9 @@ class DefenderFigure:
                 linewidth=0,
             )
             if depth:
-                axes.annotate(
-                    f"{depth} back",
-                    (rows[place, 0], 0.5),
-                    (rows[place, 0] - depth * interval, 0.5),
-                    arrowprops={"arrowstyle": "<-", "color": "black"},
-                    va="center",
-                    ha="right",
-                    fontsize=8,
-                )
+                begin, end, height = rows[place, 0], rows[place, 0] - depth * interval, next(heights)
+                axes.annotate("", (end, height), (begin, height), arrowprops={"arrowstyle": "->", "color": "black"})
+                axes.text(end - interval, height, f"{depth} back", va="center", ha="right", fontsize=8)
         axes.set(yticks=[], ylim=(0, 1))
         axes.set_title("Fixes: green used, red excluded", fontsize=9, pad=3)
 

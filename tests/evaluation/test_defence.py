@@ -183,13 +183,13 @@ def test_random_excludes_half(played):
     assert abs(played["random"].excluded.mean() - 0.5) < 5 * 0.5 / np.sqrt(tosses)
 
 
-def test_random_takes_fixes_back(world, played, monkeypatch):
+def test_random_takes_fixes_back(world, played):
     """The same exclusions without depth have other errors."""
     expected = played["random"]
     again = play_random(world, EPISODES, SEED)
     np.testing.assert_array_equal(again.error, expected.error)
-    monkeypatch.setattr(type(world.scenario), "depth_table", (0,) * len(world.scenario.depth_table))
-    shallow = play_random(world, EPISODES, SEED)
+    flat = replace(world.scenario, depth_table=(0,) * len(world.scenario.depth_table))
+    shallow = play_random(replace(world, scenario=flat), EPISODES, SEED)
     np.testing.assert_array_equal(shallow.excluded, expected.excluded)
     assert not np.array_equal(shallow.error, expected.error)
 

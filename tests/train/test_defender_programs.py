@@ -255,9 +255,9 @@ def test_oracle_depth_is_the_best_depth_of_each_game():
     world = World(scenario, "training", 0.5, tuple(calibrated_all([make_detector(SIGNED)], scenario)))
     oracle = defenders.Defenders(world, 25, 3, Console(quiet=True)).oracle_depth(TUNED[0])
     errors = []
-    for response in ("exclude:reuse=5", *(f"exclude-and-backtrack:{n},reuse=5" for n in (5, 10, 20, 50))):
+    for response in (listed.with_depth(depth, "reuse=5") for depth in scenario.depth_table):
         errors.append(play_response(world, SIGNED, make_response(response), 25, 3).error.mean(axis=1))
-    assert scenario.depth_table == (0, 5, 10, 20, 50)
+    assert len(errors) == 11
     np.testing.assert_array_equal(oracle.error.mean(axis=1), np.min(errors, axis=0))
     assert len(set(np.argmin(errors, axis=0))) > 1
 
@@ -323,7 +323,7 @@ def test_policies_that_cannot_be_told_apart_or_do_not_fit(run, tmp_path, capsys)
     weights, biases = ((*parts[:-1], parts[-1][:-1]) for parts in (policy.weights, policy.biases))
     replace(policy, weights=weights, biases=biases).save(folder)
     assert evaluate.main([*arguments, "--defender", str(folder)]) == 2
-    assert "policy 'odd' was trained on 4 depths, the game has 5" in " ".join(capsys.readouterr().err.split())
+    assert "policy 'odd' was trained on 10 depths, the game has 11" in " ".join(capsys.readouterr().err.split())
 
 
 # --- tuning and arguments ---------------------------------------------------------------------------------------------
@@ -342,7 +342,7 @@ def test_tuning_ranks_the_grid(tmp_path, monkeypatch, capsys):
     assert {(row["detector"], row["response"]) for row in rows} == {
         (detector, response)
         for detector in (WINDOWED, SIGNED)
-        for reuse in ("", "reuse=5")
+        for reuse in ("", "reuse=5", "reuse=12")
         for response in (
             f"exclude{':' if reuse else ''}{reuse}",
             f"exclude-and-backtrack:20{',' if reuse else ''}{reuse}",

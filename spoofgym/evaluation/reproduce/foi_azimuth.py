@@ -3,7 +3,7 @@
 The velocity is turned in the x-y plane of the earth-fixed frame, which is not horizontal, and the spoofed position is
 the sum of the turned velocities of whole seconds. This sum is a rectangle rule: where the vehicle itself turns it is
 off by half a second of the change of velocity, some 10 m in a turn of 60 degrees at 20 m/s. The package's own attacks
-``foi-1`` to ``foi-8`` turn the velocity horizontally and integrate it by the trapezoid rule.
+``foi-1`` to ``foi-8`` keep that rule, but turn the velocity in the horizontal plane.
 """
 
 from __future__ import annotations
