@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.envs.config import configure
 from spoofgym.simulation import Simulation
 
 Observations = NDArray[np.float32]
@@ -70,25 +71,52 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
 
     Observations, rewards, ends and infos are those of a `gymnasium.vector.SyncVectorEnv` of single environments, in all
     three autoreset modes. Lanes do not depend on their number nor on ``threads``.
+
+    Args:
+        num_envs: lanes N.
+        autoreset_mode: an `AutoresetMode` or its value; the default is Gymnasium's, NEXT_STEP.
+        max_episode_steps: epochs after which a lane is truncated; None = never, the game ends by itself.
+        render_mode: None; only the single environment draws.
+        arguments: those of the single environment, but its render mode.
+
+    Attributes:
+        config_type: of the arguments.
+        game_type: builds a game of N lanes from them.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
+    config_type: type
+    game_type: Callable[[Any, int], Game]
+
     def __init__(
         self,
-        game: Game,
-        num_envs: int,
-        autoreset_mode: AutoresetMode | str,
-        max_episode_steps: int | None,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        **arguments: Any,
     ) -> None:
-        """Take a game of ``num_envs`` lanes."""
+        """Set N lanes up.
+
+        Raises:
+            ValueError: an argument out of range, or a render mode, which only the single environment has.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs must be 1 or more, got {num_envs}")
+        if render_mode is not None:
+            raise ValueError(f"the vector environment draws nothing: render_mode must be None, got {render_mode!r}")
+        if max_episode_steps is not None and max_episode_steps < 1:
+            raise ValueError(f"max_episode_steps must be 1 or more, got {max_episode_steps}")
         self.num_envs = num_envs
-        self.game: Any = game
+        self.config: Any = configure(self.config_type, arguments)
+        self.game: Any = type(self).game_type(self.config, num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = None
-        self.single_observation_space = game.observation_space
-        self.single_action_space = game.action_space
+        self.single_observation_space = self.game.observation_space
+        self.single_action_space = self.game.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._max_episode_steps = max_episode_steps
@@ -244,17 +272,3 @@ def _fill(info: dict[str, Any], part: dict[str, Any], mask: Flags) -> None:
             info[key][mask] = value[mask]
         else:
             info[key] = value
-
-
-def check_arguments(num_envs: int, max_episode_steps: int | None, render_mode: str | None) -> None:
-    """Refuse what no native vector environment takes.
-
-    Raises:
-        ValueError: an argument out of range, or a render mode, which only the single environment has.
-    """
-    if num_envs < 1:
-        raise ValueError(f"num_envs must be 1 or more, got {num_envs}")
-    if render_mode is not None:
-        raise ValueError(f"the vector environment draws nothing: render_mode must be None, got {render_mode!r}")
-    if max_episode_steps is not None and max_episode_steps < 1:
-        raise ValueError(f"max_episode_steps must be 1 or more, got {max_episode_steps}")

@@ -144,7 +144,8 @@ def attack_reading() -> Grid:
         ("", "as printed, radians", "as printed, degrees", "foi-1 to foi-8"),
         tuple(lines),
         "Range over eight directions of the drive, which is not printed; without receiver noise. The games below are "
-        "attacked as printed, in radians; foi-1 to foi-8 are the package's own attacks, turned in the horizontal plane.",
+        "attacked as printed, in radians; foi-1 to foi-8 are the package's own attacks, turned in the horizontal "
+        "plane.",
     )
 
 
