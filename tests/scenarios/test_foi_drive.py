@@ -42,7 +42,7 @@ def test_the_game():
     assert (scenario.timeline.start, scenario.timeline.end, scenario.timeline.num_epochs) == (20.0, 250.0, 230)
     assert scenario.manoeuvres() == (111.0, 166.0)
     assert make_scenario("liu-flight").manoeuvres() == ()
-    assert (scenario.depth_table, scenario.history) == ((0, 5, 10, 20, 50), 60)
+    assert (scenario.depth_table, scenario.history) == ((0, 3, 5, 8, 12, 16, 20, 25, 30, 40, 50), 60)
     assert scenario.defender_scale == 10.0
     assert make_scenario("liu-flight").defender_scale == 50.0
     np.testing.assert_allclose(scenario.bias_sigma[[0, 3]], [np.radians(0.1) / 3600.0, 50e-6 * 9.80665])
