@@ -54,8 +54,8 @@ def share(owner: str, name: str, value: Any) -> float:
     Raises:
         ValueError: it is not.
     """
-    number = non_negative(owner, name, value)
-    if number > 1.0:
+    number = _real(owner, name, value, "a share from 0 to 1", -math.inf)
+    if not 0.0 <= number <= 1.0:
         raise ValueError(_message(owner, name, "a share from 0 to 1", value))
     return number
 

@@ -51,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
     add("--attacks", default="training", help="the population of opponents (default: %(default)s)")
     add("--detector", action="append", help=f"whose statistics the defender sees; repeatable ({', '.join(DETECTORS)})")
     add("--fidelity", default="linear", choices=FIDELITIES, help="of the simulation (default: %(default)s)")
-    add("--steps", type=count, default=DEFAULT_STEPS, help="GNSS epochs to play (default: %(default)s)")
+    add("--steps", type=count, help=f"GNSS epochs to play (default: {DEFAULT_STEPS}; a resumed run's own)")
     add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
     add("--out", type=Path, default=Path("runs/defender"), help="run folder (default: %(default)s)")
     add("--threads", type=count, default=1, help="of the learner and the simulation (default: %(default)s)")
@@ -86,6 +86,8 @@ def main(arguments: list[str] | None = None) -> int:
             config = configure(DefenderConfig, content["environment"] | {"threads": options.threads})
             config = replace(config, detectors=tuple(config.detectors))  # type: ignore[arg-type]
             settings, seed = Settings(**content["learner"]), int(content["seed"])
+            steps = options.steps or int(content["steps"])
+            _refuse_changes(options, config, settings, seed)
         else:
             config = DefenderConfig(
                 scenario=options.scenario,
@@ -95,15 +97,29 @@ def main(arguments: list[str] | None = None) -> int:
                 threads=options.threads,
             )
             settings = Settings(**{name: getattr(options, name) for name in asdict(Settings())})
-            seed = options.seed
+            seed, steps = options.seed, options.steps or DEFAULT_STEPS
         folder.mkdir(parents=True, exist_ok=True)
-        training = Training(config, settings, seed, options.steps, folder, console)
+        training = Training(config, settings, seed, steps, folder, console)
         if options.resume:
             training.resume()
     except (ValueError, TypeError, RuntimeError) as error:
         console.print(f"error: {error}", style="red", markup=False)
         return 2
     return training.run()
+
+
+def _refuse_changes(options: argparse.Namespace, config: DefenderConfig, settings: Settings, seed: int) -> None:
+    """A resumed run keeps its settings.
+
+    Raises:
+        ValueError: an option was given that says otherwise.
+    """
+    kept = {**vars(config), **asdict(settings), "seed": seed, "detector": list(config.detectors)}  # type: ignore[arg-type]
+    for name, value in vars(options).items():
+        given = value != parser().get_default(name) and name in kept and name != "threads"
+        if given and value != kept[name]:
+            option = f"--{name.replace('_', '-')}"
+            raise ValueError(f"a resumed run keeps its settings: {option} {value} was given, the run has {kept[name]}")
 
 
 class Training:
@@ -131,6 +147,10 @@ class Training:
         load_checkpoint(self._learner, self._folder)
         path = self._folder / VALIDATION_FILE
         self._validation = json.loads(path.read_text()) if path.is_file() else []
+        if self._learner.num_timesteps >= self._steps:
+            raise ValueError(
+                f"the run has played {self._learner.num_timesteps:,} steps already: give more than that by --steps"
+            )
 
     def run(self) -> int:
         """Train to the end; returns the exit status."""
@@ -142,16 +162,13 @@ class Training:
         }
         (self._folder / CONFIG_FILE).write_text(json.dumps(content, indent=2) + "\n")
         started, before, interrupted = time.perf_counter(), self._learner.num_timesteps, False
+        if before == 0 and self._settings.imitate and not self._imitate():
+            return 130
         self._watch.start()
         try:
-            if before == 0 and self._settings.imitate:
-                begin(self._learner, self._config, self._settings, self._seed)
-                self._learner.num_timesteps = 0
-                self._keep(self._learner)
-            if before < self._steps:
-                self._learner.learn(
-                    self._steps - before, callback=self._watch, reset_num_timesteps=before == 0, tb_log_name="ppo"
-                )
+            self._learner.learn(
+                self._steps - before, callback=self._watch, reset_num_timesteps=before == 0, tb_log_name="ppo"
+            )
         except KeyboardInterrupt:
             interrupted = True
         finally:
@@ -172,6 +189,19 @@ class Training:
                 markup=False,
             )
         return 130 if interrupted else 0
+
+    def _imitate(self) -> bool:
+        """Begin with a classical defender; whether that came to its end."""
+        try:
+            with self._console.status("a classical defender is imitated, then the critic learns alone"):
+                begin(self._learner, self._config, self._settings, self._seed)
+                self._learner.num_timesteps = 0
+                self._keep(self._learner)
+        except KeyboardInterrupt:
+            (self._folder / CONFIG_FILE).unlink()
+            self._console.print("interrupted before the training began: there is nothing to go on from", markup=False)
+            return False
+        return True
 
     def _result(self, learner: PPO) -> str:
         return f"mean return {mean_return(learner):.1f}"

@@ -244,7 +244,8 @@ def evaluate_defenders(
     report_rows, pairs, gaps = [], [], []
     for population in populations:
         held_out = POPULATIONS[population]
-        world = world_of(scenario, population, fidelity, threads, policies, given)
+        with console.status("thresholds of the detectors"):
+            world = world_of(scenario, population, fidelity, threads, policies, given)
         check_policies(world, policies)
         played = list(Defenders(world, episodes, seed, console).play(tuned_for(scenario.name), given, policies))
         learned = [item for item in played if item.kind == "learned"]

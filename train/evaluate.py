@@ -47,7 +47,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = argparse.ArgumentParser(
         prog="python -m train.evaluate",
-        description="Evaluate spoofers against a detector, beside baselines and the exact optimum.",
+        description="Evaluate spoofers against a detector, beside baselines and the exact optimum; or, with "
+        "--defender, defenders against populations of spoofers.",
     )
     add = result.add_argument
     add("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
@@ -95,6 +96,8 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     fidelity = options.fidelity or scenario.fidelities[0]
     scenario.check_fidelity(fidelity)
+    if options.population and not options.defender:
+        raise ValueError("--population is of attacks on defenders: it goes with --defender")
     if options.defender:
         return _defenders(options, scenario, fidelity, console)
     given = options.detector or ["snapshot"]
@@ -124,8 +127,10 @@ def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, c
     for text in options.defender:
         if ">" in text:
             given.append(parse(text))
-        else:
+        elif Path(text).is_dir():
             policies.append(LearnedDefender.load(Path(text)))
+        else:
+            raise ValueError(f"--defender {text!r} is neither a run folder nor 'detector > response'")
     populations = options.population or tuple(POPULATIONS)
     episodes = options.episodes or DEFENDER_EPISODES
     return evaluate_defenders(

@@ -67,5 +67,5 @@ def opponents(attacks: str | Attack | Sequence[str | Attack], clean: float) -> A
         pool = make_attack(f"{attacks},clean={float(clean)!r}")
         assert isinstance(pool, AttackPool)
         return pool
-    several = [attacks] if isinstance(attacks, str | Attack) else list(attacks)
+    several = list(attacks) if isinstance(attacks, Sequence) and not isinstance(attacks, str) else [attacks]
     return AttackPool([(copy.deepcopy(make_attack(item)), 1.0) for item in several], clean)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
+from spoofgym import validation
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.responses.base import Response
@@ -99,8 +100,7 @@ class DefenderConfig:
 
     def __post_init__(self) -> None:
         for name in ("clean", "outage", "multipath"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} must be a share from 0 to 1, got {getattr(self, name)}")
+            validation.share("Defender-v0", name, getattr(self, name))
         if self.error_scale is not None and not 0.0 < self.error_scale < float("inf"):
             raise ValueError(f"error_scale must be positive metres, or None for the scenario's, got {self.error_scale}")
         if not 0.0 < self.error_clip < float("inf"):

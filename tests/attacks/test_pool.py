@@ -251,7 +251,7 @@ def test_the_share_of_clean_games_can_be_any_number():
         (["ramp:1", "ramp:1"], 0.5, "once only"),
         ([], 0.5, "at least one member"),
         ("training", 1.5, r"clean must be a share from 0 to 1, got 1\.5"),
-        ("ramp:1", -0.5, "clean must be a finite number, 0 or more"),
+        ("ramp:1", -0.5, "clean must be a share from 0 to 1"),
         ("training:0.1", 0.5, "'clean' is given twice"),
         ("held-out:manoeuvre=2", 0.5, "manoeuvre must be a share from 0 to 1"),
         ("ramp", 0.5, "'ramp' needs 'rate'"),

@@ -151,6 +151,37 @@ def test_a_run_can_be_resumed(run, tmp_path, capsys):
     LearnedDefender.load(folder)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--steps", "9999", "--seed", "7"], "a resumed run keeps its settings: --seed 7 was given, the run has 0"),
+        (["--steps", "9999", "--attacks", "held-out"], "--attacks held-out was given, the run has training"),
+        (["--steps", "9999", "--gamma", "0.5"], "--gamma 0.5 was given, the run has 0.99"),
+        ([], "steps already: give more than that by --steps"),
+    ],
+)
+def test_a_resumed_run_refuses_other_settings_and_stays_as_it_is(run, tmp_path, capsys, arguments, message):
+    folder = tmp_path / "resumed"
+    shutil.copytree(run, folder)
+    kept = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    assert defender.main([*arguments, "--out", str(folder), "--resume"]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == kept
+
+
+def test_an_interrupted_beginning_leaves_a_folder_that_can_be_used_again(tmp_path, capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    folder = tmp_path / "short"
+    with monkeypatch.context() as patch:
+        patch.setattr(defender, "begin", interrupted)
+        assert defender.main([*SHORT, "--imitate", "true", "--steps", str(STEPS), "--out", str(folder)]) == 130
+    assert "there is nothing to go on from" in " ".join(capsys.readouterr().err.split())
+    assert defender.main([*SHORT, "--imitate", "false", "--steps", str(STEPS), "--out", str(folder)]) == 0
+    LearnedDefender.load(folder)
+
+
 def test_equal_seeds_train_equal_policies(run, tmp_path):
     folder = tmp_path / "again"
     assert defender.main([*SHORT, "--steps", str(STEPS), "--out", str(folder)]) == 0
@@ -291,7 +322,7 @@ def test_tables_fit_a_terminal_and_a_figure_is_drawn(run, tmp_path, capsys, monk
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--defender", "nowhere"], "nowhere is no run folder: it has no policy.npz"),
+        (["--defender", "nowhere"], "--defender 'nowhere' is neither a run folder nor 'detector > response'"),
         (["--defender", "> exclude"], "spelled 'detector > response', e.g. 'snapshot > exclude', got '> exclude'"),
         (["--defender", "oracle > exclude"], "unknown detector 'oracle'"),
         (["--defender", "snapshot > pray"], "unknown response 'pray'"),
