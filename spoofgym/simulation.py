@@ -76,12 +76,8 @@ class Simulation:
         self.scenario = scenario
         self.num_runs = num_runs
         self.streams = RunStreams.from_seed(seed, num_runs)
-        for detector in detectors:
-            detector.bind(num_runs, scenario.dimension)
-            detector.know(scenario.bias_sigma)
-            if detector.threshold is None:
-                raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
         self.detectors = {detector.name: detector for detector in detectors}
+        self._bind_detectors()
         self.attack = attack
         if attack is not None:
             attack.bind(scenario.timeline, num_runs)
@@ -111,6 +107,13 @@ class Simulation:
         self.offset = self._no_offset.copy()
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
+
+    def _bind_detectors(self) -> None:
+        for detector in self.detectors.values():
+            detector.bind(self.num_runs, self.scenario.dimension)
+            detector.know(self.scenario.bias_sigma)
+            if detector.threshold is None:
+                raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
 
     def _blank_epoch(self) -> Epoch:
         n, m = self.num_runs, self.scenario.dimension

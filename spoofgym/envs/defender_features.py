@@ -217,19 +217,25 @@ def _fill(
         row[place + 6] = 1.0 if excluding[lane] else 0.0
         row[place + 7] = coast[lane]
         row[place + 8] = np.sqrt(covariance[lane, 0, 0] + covariance[lane, 1, 1])
-        speed = 0.0
-        change = 0.0
-        for a in range(3):
-            speed += velocity[lane, a] ** 2
-            if index[lane] > 0:
-                change += (velocity[lane, a] - last_velocity[lane, a]) ** 2
-            last_velocity[lane, a] = velocity[lane, a]
-        row[place + 9] = np.sqrt(speed)
-        row[place + 10] = np.sqrt(change) / interval
+        _motion(velocity[lane], last_velocity[lane], index[lane] == 0, interval, row[place + 9 : place + 11])
         place += 11
         for a in range(6):
             row[place + a] = bias[lane, a] / bias_sigma[a]
         row[place + 6] = index[lane] / horizon
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _motion(velocity: Floats, last: Floats, first: bool, interval: float, row: Floats) -> None:
+    """Write speed and acceleration, (2,), m/s and m/s², and keep the velocity (3,); no acceleration at epoch 0."""
+    speed = 0.0
+    change = 0.0
+    for a in range(3):
+        speed += velocity[a] ** 2
+        if not first:
+            change += (velocity[a] - last[a]) ** 2
+        last[a] = velocity[a]
+    row[0] = np.sqrt(speed)
+    row[1] = np.sqrt(change) / interval
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
