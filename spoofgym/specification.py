@@ -2,12 +2,14 @@
 
 Command line, environment arguments, opponent pools, tables and files all name a detector, an attack, a response or a
 scenario this way: ``snapshot``, ``windowed:n=20,arl0=1e5``, ``ramp:0.5,direction=135``,
-``recorded:PATH,grade=tactical``.
+``recorded:PATH,grade=tactical``. A part within a part has ``/`` in place of its commas:
+``ensemble:snapshot+windowed:n=20/threshold=115,arl0=1e4``.
 """
 
 from __future__ import annotations
 
 import inspect
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -15,6 +17,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 Part = TypeVar("Part")
+
+KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Specification:
         pieces = [piece.strip() for piece in rest.split(",")] if separator else []
         for position, piece in enumerate(pieces):
             key, equals, content = (part.strip() for part in piece.partition("="))
-            if not equals and position == 0 and separator == ":" and piece:
+            if position == 0 and separator == ":" and piece and not (equals and (not key or KEY.fullmatch(key))):
                 value = piece
             elif not equals or not key or not content:
                 raise ValueError(f"specification {text!r}: {piece!r} is not key=value")
@@ -64,6 +68,16 @@ class Specification:
         pieces = [] if self.value is None else [self.value]
         pieces += [f"{key}={value}" for key, value in self.options.items()]
         return self.name + (":" + ",".join(pieces) if pieces else "")
+
+
+def nest(text: str) -> str:
+    """A specification as the value of another one: ``/`` stands for the comma between its options."""
+    return text.replace(",", "/")
+
+
+def unnest(text: str) -> str:
+    """The specification that `nest` wrote."""
+    return text.replace("/", ",")
 
 
 def spell(name: str, value: object = None, **options: object) -> str:

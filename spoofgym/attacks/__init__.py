@@ -1,4 +1,4 @@
-"""What a spoofer adds to the fixes: profiles laid down in advance."""
+"""What a spoofer adds to the fixes, one file per idea."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 
 from spoofgym.attacks.azimuth import FOI_ATTACKS, Azimuth
 from spoofgym.attacks.base import Attack
+from spoofgym.attacks.circle import Circle
+from spoofgym.attacks.exponential import Exponential
 from spoofgym.attacks.families import (
     ClimbingSpiral,
     DecayingJump,
@@ -16,9 +18,19 @@ from spoofgym.attacks.families import (
     SignChangingRamp,
     TwoStageRamp,
 )
+from spoofgym.attacks.fusion_ripper import FusionRipper
+from spoofgym.attacks.meaconing import Meaconing
+from spoofgym.attacks.noise_matched import NoiseMatched
 from spoofgym.attacks.pool import POPULATIONS, AttackPool
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
-from spoofgym.specification import Specification, build
+from spoofgym.attacks.tracking_error import SIGMA, TrackingError
+from spoofgym.specification import Specification, build, unnest
+
+
+def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0) -> TrackingError:
+    """The tracking error around an attack that is spelled with ``/`` in place of its commas."""
+    return TrackingError(make_attack(unnest(attack)), sigma, time)
+
 
 ATTACKS: dict[str, Callable[..., Attack]] = {
     "none": NoAttack,
@@ -26,6 +38,11 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "ramp": Ramp,
     "jump-ramp": JumpRamp,
     "slow-change": SlowChange,
+    "exponential": Exponential,
+    "circle": Circle,
+    "meaconing": Meaconing,
+    "fusion-ripper": FusionRipper,
+    "noise-matched": NoiseMatched,
     "azimuth": Azimuth,
     **FOI_ATTACKS,
     "random-ramp": RandomRamp,
@@ -36,6 +53,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "decaying-jump": DecayingJump,
     "climbing-spiral": ClimbingSpiral,
     **POPULATIONS,
+    "tracking-error": _tracking_error,
 }
 
 

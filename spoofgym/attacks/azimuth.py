@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.base import Attack
+from spoofgym.attacks.fixed_offsets import FixedOffsets
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
-from spoofgym.streams import RunStreams
 
 DECAY = 45.0
 """Length of the decay, s, where the attack lasts so long. The report's table leaves it out; with it the parallel run of
@@ -34,7 +34,7 @@ def azimuth_error(since: Floats, azimuth: float, growth: float, decay: float) ->
     return np.expm1(np.log1p(azimuth) * np.clip(left, 0.0, 1.0))
 
 
-class Azimuth(Attack):
+class Azimuth(FixedOffsets):
     """The receiver is led along the true speed with a false azimuth (FOI-R-5687, chapter 4).
 
     The spoofed position advances by the turned velocity of the coming epoch, p(i+1) = p(i) + v(i+1) Δt, from the true
@@ -90,14 +90,12 @@ class Azimuth(Attack):
         super().bind(timeline, num_runs)
         if self.end is not None and self.end <= self._onset:
             raise ValueError(f"azimuth: end must be later than the onset at {self._onset:g} s, got {self.end!r}")
-        self._offsets = np.zeros((timeline.num_epochs + 1, 3))
+        self._end = timeline.end if self.end is None else self.end
 
     def follow(self, velocity: Floats) -> None:
         """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
-        timeline = self._timeline
-        times, interval = timeline.times, timeline.interval
-        end = timeline.end if self.end is None else self.end
-        since = times - self._onset
+        times, interval, end = self._timeline.times, self._timeline.interval, self._end
+        since = self._since()
         decay = max(min(self.decay, end - self._onset - self.growth), interval)
         error = -azimuth_error(np.maximum(since, 0.0), np.radians(self.azimuth), self.growth, decay)
         cosine, sine = np.cos(error), np.sin(error)
@@ -110,13 +108,9 @@ class Azimuth(Attack):
         self._offsets[1:, :2] = np.cumsum(steps, axis=0)
         self._offsets[~inside] = 0.0
 
-    def episode(self, runs: Runs, streams: RunStreams) -> Floats:
-        """The same offsets in every run and episode, (n, K+1, 3), m ENU."""
-        return np.broadcast_to(self._offsets, (len(runs), *self._offsets.shape))
-
-    def offset(self, clock: Clock) -> Floats:
-        """This epoch's offset, (N, 3), m ENU."""
-        return self._offsets[np.maximum(clock.index, 0)]
+    def active(self, clock: Clock) -> Flags:
+        """Whether the receiver follows the spoofer, (N,): to the end of the attack."""
+        return self.started(clock) & (clock.time <= self._end + 1e-9)
 
 
 FOI_SCENARIOS: dict[int, tuple[float, float, float, float]] = {

@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.streams import RunStreams
 
 
@@ -20,9 +20,11 @@ class Attack(ABC):
     Attributes:
         onset: scenario time from which the offset grows, s; None = the start of the game (its epoch 0, the last clean
             one).
+        needs_model: whether it must `study` the victim's filter.
     """
 
     onset: float | None = None
+    needs_model: bool = False
 
     @property
     @abstractmethod
@@ -51,6 +53,9 @@ class Attack(ABC):
     def follow(self, velocity: Floats) -> None:  # noqa: B027 - most attacks do not care where the vehicle goes
         """Take the vehicle's true velocity at epochs 0..K, which a spoofer tracks, (K+1, 3), ENU, m/s; after `bind`."""
 
+    def study(self, model: LinearModel) -> None:  # noqa: B027 - most attacks are blind to the filter
+        """Take the victim's linear model, epochs 0..K, every fix used; after `follow`, and only where it is needed."""
+
     def episode(self, runs: Runs, streams: RunStreams) -> Floats:
         """Start new episodes of some runs and look at all that they will send, (n, K+1, 3), m ENU."""
         self.reset(runs, streams)
@@ -64,9 +69,13 @@ class Attack(ABC):
         """Time since the onset, (N,), s; zero before it."""
         return np.maximum(clock.time - self._onset, 0.0)
 
-    def started(self, clock: Clock) -> NDArray[np.bool_]:
+    def started(self, clock: Clock) -> Flags:
         """Whether the epoch lies after the onset, (N,); rounding of its time does not count."""
         return clock.time - self._onset > 1e-6 * self._timeline.interval
+
+    def active(self, clock: Clock) -> Flags:
+        """Whether the receiver follows the spoofer at the epoch, (N,), though the offset be zero."""
+        return self.started(clock)
 
     @abstractmethod
     def offset(self, clock: Clock) -> Floats:

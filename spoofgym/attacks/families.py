@@ -11,7 +11,7 @@ from abc import abstractmethod
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Clock, Timeline, manoeuvre_times
 from spoofgym.specification import spell
@@ -30,6 +30,14 @@ TO_THE_END = 0.3
 BEFORE_MANOEUVRE = 10.0
 """An onset in view of a manoeuvre comes at most so long before it, s."""
 DEFAULT_MANOEUVRE = 0.15
+
+
+def spoofed_stretch(offsets: Floats) -> tuple[Runs, Runs]:
+    """First and last epoch of episodes (n, K+1, 3) with an offset, (n,) each; K + 1 and 0 where there is none."""
+    spoofed = np.any(offsets, axis=2)
+    attacked, epochs = np.any(spoofed, axis=1), spoofed.shape[1]
+    first = np.where(attacked, spoofed.argmax(axis=1), epochs)
+    return first, np.where(attacked, epochs - 1 - spoofed[:, ::-1].argmax(axis=1), 0)
 
 
 class AttackFamily(Attack):
@@ -68,6 +76,7 @@ class AttackFamily(Attack):
         self._elapsed_times = timeline.times - timeline.start
         self._offsets = np.zeros((num_runs, timeline.num_epochs + 1, 3))
         self._runs = np.arange(num_runs)
+        self._first, self._last = spoofed_stretch(self._offsets)
 
     def follow(self, velocity: Floats) -> None:
         """Find the vehicle's manoeuvres in its true velocity at epochs 0..K, (K+1, 3), m/s."""
@@ -77,6 +86,7 @@ class AttackFamily(Attack):
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the offsets of new episodes."""
         self._offsets[runs] = self.episode(runs, streams)
+        self._first[runs], self._last[runs] = spoofed_stretch(self._offsets[runs])
 
     def episode(self, runs: Runs, streams: RunStreams) -> Floats:
         """Draw new episodes; all their offsets, (n, K+1, 3), m ENU."""
@@ -115,6 +125,10 @@ class AttackFamily(Attack):
     def offset(self, clock: Clock) -> Floats:
         """This epoch's offset, (N, 3), m ENU."""
         return self._offsets[self._runs, np.maximum(clock.index, 0)]
+
+    def active(self, clock: Clock) -> Flags:
+        """Whether the receiver follows the spoofer, (N,): from the first offset of the episode to the last."""
+        return (self._first <= clock.index) & (clock.index <= self._last)
 
     @abstractmethod
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:

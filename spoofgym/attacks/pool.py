@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.families import (
     DEFAULT_MANOEUVRE,
@@ -18,8 +18,10 @@ from spoofgym.attacks.families import (
     RandomRamp,
     SignChangingRamp,
     TwoStageRamp,
+    spoofed_stretch,
 )
 from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
 
@@ -52,6 +54,7 @@ class AttackPool(Attack):
             raise ValueError("a pool of attacks needs at least one member")
         self.clean = validation.share("pool of attacks", "clean", clean)
         self._members = [member for member, _ in members]
+        self.needs_model = any(member.needs_model for member in self._members)
         self.names = tuple(member.name for member in self._members)
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"each attack can be in a pool once only, got {', '.join(self.names)}")
@@ -73,16 +76,21 @@ class AttackPool(Attack):
         super().bind(timeline, num_runs)
         for member in self._members:
             member.bind(timeline, num_runs)
-        epochs = timeline.num_epochs + 1
-        self.offsets: Floats = np.zeros((num_runs, epochs, 3))
+        self.offsets: Floats = np.zeros((num_runs, timeline.num_epochs + 1, 3))
         self.member: Runs = np.full(num_runs, CLEAN)
-        self.first, self.last = np.full(num_runs, epochs), np.zeros(num_runs, dtype=np.int64)
+        self.first, self.last = spoofed_stretch(self.offsets)
         self._runs = np.arange(num_runs)
 
     def follow(self, velocity: Floats) -> None:
         """Tell every member the vehicle's true velocity at epochs 0..K, (K+1, 3), m/s."""
         for member in self._members:
             member.follow(velocity)
+
+    def study(self, model: LinearModel) -> None:
+        """Show the victim's linear model to every member that needs it."""
+        for member in self._members:
+            if member.needs_model:
+                member.study(model)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the opponents of new episodes, and all that these will do."""
@@ -94,10 +102,11 @@ class AttackPool(Attack):
             chosen = runs[self.member[runs] == place]
             if len(chosen):
                 self.offsets[chosen] = attack.episode(chosen, streams)
-        spoofed = np.any(self.offsets[runs], axis=2)
-        epochs = spoofed.shape[1]
-        self.first[runs] = np.where(np.any(spoofed, axis=1), spoofed.argmax(axis=1), epochs)
-        self.last[runs] = np.where(np.any(spoofed, axis=1), epochs - 1 - spoofed[:, ::-1].argmax(axis=1), 0)
+        self.first[runs], self.last[runs] = spoofed_stretch(self.offsets[runs])
+
+    def active(self, clock: Clock) -> Flags:
+        """Whether the receiver follows the spoofer, (N,): from the first offset of the episode to the last."""
+        return (self.first <= clock.index) & (clock.index <= self.last)
 
     def offset(self, clock: Clock) -> Floats:
         """This epoch's offset, (N, 3), m ENU."""

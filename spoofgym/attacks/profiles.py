@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
@@ -31,6 +31,10 @@ class NoAttack(Attack):
     def name(self) -> str:
         """The specification that builds this attack."""
         return "none"
+
+    def active(self, clock: Clock) -> Flags:
+        """Never, (N,)."""
+        return np.zeros(self._num_runs, dtype=bool)
 
     def offset(self, clock: Clock) -> Floats:
         """Zero, (N, 3), m ENU."""

@@ -14,16 +14,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from spoofgym.arrays import Floats
+from spoofgym.navigation.expected_innovation import check_position_fix, offsets_of
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.play import Outcome, expected_play
-from spoofgym.optimum.response import (
-    azimuth_of,
-    check_epochs,
-    check_position_fix,
-    error_response,
-    half_circle_sign,
-    offsets_of,
-)
+from spoofgym.optimum.response import azimuth_of, check_epochs, error_response, half_circle_sign
 from spoofgym.optimum.survival import check_threshold, log_survival
 
 
@@ -62,7 +56,7 @@ def noncentrality_optimum(model: LinearModel, num_epochs: int, budget: float) ->
     Raises:
         ValueError: m is not 3, more epochs than the model has, or a budget that is negative or not finite.
     """
-    check_position_fix(model)
+    check_position_fix(model, "a closed form")
     check_epochs(model, num_epochs)
     if not (math.isfinite(budget) and budget >= 0.0):
         raise ValueError(f"budget must be finite and not negative, got {budget!r}")
@@ -84,7 +78,7 @@ def best_budget(model: LinearModel, threshold: float) -> tuple[ClosedForm, Outco
     Raises:
         ValueError: m is not 3, or a threshold that is not positive.
     """
-    check_position_fix(model)
+    check_position_fix(model, "a closed form")
     check_threshold(threshold)
     num_epochs = model.num_epochs
     _, _, profile = _furthest(error_response(model, num_epochs))

@@ -21,17 +21,6 @@ def check_epochs(model: LinearModel, num_epochs: int) -> None:
         raise ValueError(f"num_epochs must lie in 1..{available} (the epochs of the model), got {num_epochs}")
 
 
-def check_position_fix(model: LinearModel) -> None:
-    """Refuse a model whose fixes are not a position alone.
-
-    Raises:
-        ValueError: m is not 3, so offsets cannot provoke every innovation.
-    """
-    dimension = model.dimension
-    if dimension != 3:
-        raise ValueError(f"a closed form exists only for position fixes (m = 3), this model has m = {dimension}")
-
-
 def error_response(model: LinearModel, num_epochs: int) -> Floats:
     """How the innovation of each epoch moves the final horizontal error: e_M = Σ_k G_k u_k.
 
@@ -51,29 +40,6 @@ def error_response(model: LinearModel, num_epochs: int) -> Floats:
         response[:, k - 1] = -rows @ model.whitened_gain[k].T
         rows = rows @ model.transition[k]
     return response
-
-
-def offsets_of(model: LinearModel, whitened: Floats) -> Floats:
-    """The offsets that provoke given mean innovations: s_k = H_k e⁻_k - L_k u_k (position fixes only).
-
-    Args:
-        model: the filter along the scenario.
-        whitened: u_k of epochs 1..M, (M, 3).
-
-    Returns:
-        s_k, (M, 3), m ENU.
-
-    Raises:
-        ValueError: m is not 3.
-    """
-    check_position_fix(model)
-    error = np.zeros(NUM_STATES)
-    offsets = np.empty_like(whitened)
-    for k, mean in enumerate(whitened, start=1):
-        error = model.transition[k] @ error
-        offsets[k - 1] = model.observation[k] @ error[:9] - model.innovation_factor[k] @ mean
-        error = error - mean @ model.whitened_gain[k]
-    return offsets
 
 
 def increment_maps(model: LinearModel) -> tuple[Floats, Floats]:

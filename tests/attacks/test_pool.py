@@ -133,7 +133,16 @@ def test_members_know_which_run_they_play_in():
         np.testing.assert_array_equal(alone.offsets[0], whole.offsets[run])
 
 
-REQUIRED = {"ramp": ":1", "jump-ramp": ":1,jump=5", "azimuth": ":5"}
+REQUIRED = {
+    "ramp": ":1",
+    "jump-ramp": ":1,jump=5",
+    "azimuth": ":5",
+    "exponential": ":0.5",
+    "circle": ":10",
+    "meaconing": ":2",
+    "fusion-ripper": ":1",
+    "tracking-error": ":ramp:1/direction=0",
+}
 
 
 @pytest.mark.parametrize("name", ATTACKS)
@@ -145,6 +154,7 @@ def test_every_attack_builds_from_its_name_and_is_the_same(name):
     for attack in (original, make_attack(original.name)):
         attack.bind(scenario.timeline, 4)
         attack.follow(scenario.velocity())
+        attack.study(scenario.linear_model())
         offsets.append(np.array(attack.episode(np.arange(4), RunStreams.from_seed(3, 4))))
     np.testing.assert_array_equal(*offsets)
     assert offsets[0].shape == (4, 231, 3)

@@ -208,7 +208,7 @@ def test_make_attack_takes_objects():
 @pytest.mark.parametrize(
     ("specification", "message"),
     [
-        ("drift", "unknown attack 'drift'; valid names: azimuth, .*, jump, jump-ramp, none, .*, slow-change, "),
+        ("drift", "unknown attack 'drift'; valid names: azimuth, .*, jump, jump-ramp, .*, none, .*, slow-change, "),
         ("ramp", "needs 'rate'"),
         ("ramp:-0.5", "rate must be a finite number, 0 or more, got -0.5"),
         ("ramp:nan", "rate must be a finite number, 0 or more, got nan"),

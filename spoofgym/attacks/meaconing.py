@@ -1,0 +1,66 @@
+"""Meaconing: the receiver is shown where the vehicle was some seconds ago."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spoofgym import validation
+from spoofgym.arrays import Floats
+from spoofgym.attacks.fixed_offsets import FixedOffsets
+from spoofgym.navigation.interface import Timeline
+from spoofgym.specification import spell
+
+
+def path(velocity: Floats, timeline: Timeline, time: Floats) -> Floats:
+    """Where the vehicle is at times up to the end of the game, from where it is at epoch 0, (n, 3), m ENU.
+
+    Its velocity runs straight between epochs and is that of epoch 0 before it, so that p(t) = p_k + v_k τ + (v_{k+1} -
+    v_k) τ² / 2Δ with τ the time since epoch k.
+
+    Args:
+        velocity: at epochs 0..K, (K+1, 3), ENU, m/s.
+        timeline: of these epochs.
+        time: scenario times, (n,), s.
+    """
+    interval, last = timeline.interval, timeline.num_epochs
+    steps = 0.5 * interval * (velocity[1:] + velocity[:-1])
+    position = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    epochs = (time - timeline.start) / interval
+    before = np.clip(np.floor(epochs).astype(np.int64), 0, last - 1)
+    into = (epochs - before)[:, None] * interval
+    bend = 0.5 * (velocity[before + 1] - velocity[before]) * np.maximum(into, 0.0) ** 2 / interval
+    return position[before] + velocity[before] * into + bend
+
+
+class Meaconing(FixedOffsets):
+    """The fixes of ``delay`` seconds ago, which the spoofer recorded and replays: s(t) = p(t - delay) - p(t).
+
+    All three axes are shifted, backward along the vehicle's own track, by the distance that it goes in the delay: an
+    attack without any knowledge of receiver or filter. The clock error that a replay brings, too, is not part of a
+    fix. The track is the integral of the true velocity at the epochs; before the game it goes on straight backward.
+
+    Args:
+        delay: s.
+        ramp_up: time after the onset in which the delay grows evenly from zero to its value, s; 0 = at once.
+        onset: scenario time, s; None = the start of the game.
+
+    Raises:
+        ValueError: a time is negative or not finite.
+    """
+
+    def __init__(self, delay: float, ramp_up: float = 0.0, onset: float | None = None) -> None:
+        self.delay = validation.non_negative("meaconing", "delay", delay)
+        self.ramp_up = validation.non_negative("meaconing", "ramp_up", ramp_up)
+        self.onset = None if onset is None else validation.finite("meaconing", "onset", onset)
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this attack."""
+        return spell("meaconing", self.delay, ramp_up=self.ramp_up or None, onset=self.onset)
+
+    def follow(self, velocity: Floats) -> None:
+        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        times, since = self._timeline.times, np.maximum(self._since(), 0.0)
+        share = np.minimum(since / self.ramp_up, 1.0) if self.ramp_up else np.ones_like(since)
+        shown = path(velocity, self._timeline, times - self.delay * share)
+        self._lay(shown - path(velocity, self._timeline, times))
