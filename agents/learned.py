@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -101,6 +101,12 @@ class LearnedSpoofer(LearnedPolicy):
     """A spoofer that plays the mean action of its network."""
 
     config_type = SpooferConfig
+
+    def with_shadow(self, shadow: str | None) -> Self:
+        """The same policy with a shadow filter of another scenario (None: the victim's own); a blind one has none."""
+        if self.config.knowledge == "blind":
+            return self
+        return replace(self, config=replace(self.config, shadow=shadow))
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions in [-1, 1] for observations (N, D), (N, 3)."""

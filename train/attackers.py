@@ -49,8 +49,7 @@ class Evaluation:
 
     def rows(self, policies: list[LearnedSpoofer], attacks: list[Attack], console: Console) -> list[dict[str, Any]]:
         """Rows of the baselines, of scripted attacks and of policies, in this order."""
-        for policy in policies:
-            policy.check_layout(self._game(policy, 1).fields)
+        self.check_layouts(policies)
         with console.status("baselines"):
             baselines = self._baselines()
         optimum = next((baseline.exact for baseline in baselines if baseline.name == "optimum"), None)
@@ -61,24 +60,34 @@ class Evaluation:
             rows.append(self._row(Baseline(attack.name, "blind", attack, None), optimum, console))
         for policy in policies:
             with console.status(policy.name):
-                score = attacker_score(self._play_policy(policy))
-                exact = self._exact(policy)
+                score = attacker_score(self.play_policy(policy))
+                exact = self.exact(policy)
             rows.append(attacker_row(policy.name, policy.config.knowledge, score, exact, optimum))
         return rows
+
+    def check_layouts(self, policies: list[LearnedSpoofer]) -> None:
+        """Refuse policies that were trained for another observation.
+
+        Raises:
+            ValueError: naming the policy and the first entry that differs.
+        """
+        for policy in policies:
+            policy.check_layout(self._game(policy, 1).fields)
 
     def _baselines(self) -> list[Baseline]:
         if self.threshold is not None:
             return known_baselines(self.scenario, self.threshold)
-        return searched_baselines(self.scenario, lambda attack, episodes: self._play(attack, episodes))
+        return searched_baselines(self.scenario, self.play)
 
     def _row(self, baseline: Baseline, optimum: float | None, console: Console) -> dict[str, Any]:
         score = None
         if baseline.attack is not None:
             with console.status(baseline.name):
-                score = attacker_score(self._play(baseline.attack, self.episodes))
+                score = attacker_score(self.play(baseline.attack, self.episodes))
         return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
 
-    def _play(self, attack: Attack, episodes: int) -> Episodes:
+    def play(self, attack: Attack, episodes: int) -> Episodes:
+        """Games of an attack."""
         return play_attack(
             self.scenario,
             attack,
@@ -90,7 +99,7 @@ class Evaluation:
         )
 
     def _game(self, policy: LearnedSpoofer, lanes: int) -> SpooferGame:
-        """The evaluated game as this policy sees it: its own knowledge and action."""
+        """The evaluated game as this policy sees it: its own knowledge, action, memory and shadow filter."""
         config: SpooferConfig = replace(
             policy.config,
             scenario=self.scenario,
@@ -100,14 +109,19 @@ class Evaluation:
         )
         return SpooferGame(config, lanes)
 
-    def _play_policy(self, policy: LearnedSpoofer) -> Episodes:
+    def play_policy(self, policy: LearnedSpoofer) -> Episodes:
+        """Games of a policy."""
+
         def make(lanes: int) -> SpooferGame:
             return self._game(policy, lanes)
 
         return play_policy(make, policy.act, self.episodes, self.seed)
 
-    def _exact(self, policy: LearnedSpoofer) -> float | None:
-        """Exact undetected error of a policy whose offsets do not depend on chance; else None."""
+    def exact(self, policy: LearnedSpoofer) -> float | None:
+        """Exact undetected error of a policy whose offsets do not depend on chance, m; else None.
+
+        The policy may choose them by the shadow filter of another model: what they are worth is the victim's to say.
+        """
         if self.threshold is None or policy.config.knowledge == "full" or policy.config.tracking_sigma:
             return None
         offsets = offsets_without_chance(self._game(policy, 1), policy.act)

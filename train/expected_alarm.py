@@ -1,9 +1,9 @@
 """The spoofer's game with the chance of the alarm taken out of the reward.
 
 Whether the snapshot test alarms at an epoch depends, given the spoofer's offsets, on a white innovation that nobody can
-foresee. Its probability p_k is known from the shadow filter (noncentral chi-square), so a learner can be paid the
-expectation instead of the draw: the game goes on after an alarm, and with the survival S_k = Π (1 - p_i) and the error
-gained G_k it pays
+foresee. Its probability p_k is known from a shadow filter of the victim's own model (noncentral chi-square), so a
+learner can be paid the expectation instead of the draw: the game goes on after an alarm, and with the survival S_k =
+Π (1 - p_i) and the error gained G_k it pays
 
     S_k G_k - S_{k-1} G_{k-1},
 
@@ -29,12 +29,16 @@ from spoofgym.scenarios import make_scenario
 
 
 def alarm_probability_is_known(config: SpooferConfig) -> bool:
-    """Whether the snapshot test is alone, its filter matched, and shadowed by the spoofer without tracking error."""
+    """Whether the snapshot test is alone, its filter matched, and shadowed by the spoofer without tracking error.
+
+    A shadow filter of another scenario's model (``config.shadow``) does not tell the victim's mean innovations.
+    """
     detector = config.detector
     return (
         isinstance(detector, str)
         and detector.partition(":")[0] == "snapshot"
         and config.knowledge != "blind"
+        and config.shadow in (None, config.scenario)
         and config.on_alarm == "end"
         and config.forfeit == 1.0
         and config.tracking_sigma == 0.0

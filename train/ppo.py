@@ -62,8 +62,9 @@ class Settings:
 def environment_arguments(config: SpooferConfig) -> dict[str, Any]:
     """The arguments that rebuild the environment, for ``config.json``."""
     arguments = asdict(config)
-    if not all(isinstance(arguments[key], str) for key in ("scenario", "detector", "response")):
-        raise ValueError("a training run needs scenario, detector and response by their specifications")
+    parts = [arguments[key] for key in ("scenario", "detector", "response")]
+    if not all(isinstance(part, str) for part in parts) or not isinstance(arguments["shadow"], str | None):
+        raise ValueError("a training run needs scenario, detector, response and shadow by their specifications")
     return arguments
 
 

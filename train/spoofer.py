@@ -49,6 +49,8 @@ def parser() -> argparse.ArgumentParser:
     add("--detector", default="snapshot", help="snapshot, windowed:n=20, ... (default: %(default)s)")
     add("--knowledge", default="shadow", choices=KNOWLEDGE, help="of the victim (default: %(default)s)")
     add("--action", default="rate", choices=ACTIONS, help="what the policy controls (default: %(default)s)")
+    add("--frames", type=count, default=1, help="epochs that the policy sees at once (default: %(default)s)")
+    add("--shadow", metavar="SPEC", help="scenario whose filter the spoofer takes for the victim's (default: its own)")
     add("--fidelity", default="linear", choices=FIDELITIES, help="of the simulation (default: %(default)s)")
     add("--steps", type=count, default=DEFAULT_STEPS, help="GNSS epochs to play (default: %(default)s)")
     add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
@@ -82,6 +84,8 @@ def main(arguments: list[str] | None = None) -> int:
                 knowledge=options.knowledge,
                 action=options.action,
                 fidelity=options.fidelity,
+                frames=options.frames,
+                shadow=options.shadow,
                 threads=options.threads,
             )
             settings, seed = Settings(), options.seed

@@ -60,6 +60,9 @@ class SpooferConfig:
     response: str | Response = "exclude"
     forfeit: float = 1.0
     tracking_sigma: float = 0.0
+    tracking_time: float = 0.0
+    frames: int = 1
+    shadow: str | Scenario | None = None
     threads: int = 1
 
     def __post_init__(self) -> None:
@@ -70,10 +73,16 @@ class SpooferConfig:
             raise ValueError(
                 "action 'innovation' runs a shadow filter: knowledge must be 'shadow' or 'full', not 'blind'"
             )
+        if self.shadow is not None and self.knowledge == "blind":
+            raise ValueError(
+                f"shadow {self.shadow!r} needs knowledge 'shadow' or 'full': a 'blind' spoofer has no shadow filter"
+            )
+        validation.whole("Spoofer-v0", "frames", self.frames, 1)
         if not 0 <= self.forfeit < float("inf"):
             raise ValueError(f"forfeit must be 0 or more and finite, got {self.forfeit}")
         if not 0 <= self.tracking_sigma < float("inf"):
             raise ValueError(f"tracking_sigma must be 0 or more metres, got {self.tracking_sigma}")
+        validation.non_negative("Spoofer-v0", "tracking_time", self.tracking_time)
         if self.threads < 1:
             raise ValueError(f"threads must be 1 or more, got {self.threads}")
 

@@ -1,4 +1,4 @@
-"""The spoofer's copy of the victim's filter, run in expectation.
+"""The spoofer's copy of the victim's filter, or of what it takes for it, run in expectation.
 
 Liu 2018, eqs 32-34: with the gains of the filter known, the mean error and the mean innovation follow from the offsets
 alone,
@@ -16,9 +16,33 @@ from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.parallel import RunSlices
+from spoofgym.scenario import Scenario
 
 GRAIN = 4096
 """Lanes below which a slice is not worth a thread."""
+
+
+def shadow_model(victim: Scenario, shadow: Scenario) -> LinearModel:
+    """The linear model that a spoofer runs in place of the victim's: that of the scenario it takes the victim for.
+
+    Args:
+        victim: scenario of the game.
+        shadow: the scenario that the spoofer believes in.
+
+    Raises:
+        ValueError: another timeline or dimension of the fix than the victim's, or a scenario without a linear model.
+    """
+    mine, theirs = victim.timeline, shadow.timeline
+    pairs = {
+        "start, s": (theirs.start, mine.start),
+        "interval, s": (theirs.interval, mine.interval),
+        "epochs": (theirs.num_epochs, mine.num_epochs),
+        "dimension of the fix": (shadow.dimension, victim.dimension),
+    }
+    differing = [f"{name}: {has} instead of {needs}" for name, (has, needs) in pairs.items() if has != needs]
+    if differing:
+        raise ValueError(f"shadow {shadow.name!r} does not fit the game {victim.name!r}: {'; '.join(differing)}")
+    return shadow.linear_model()
 
 
 class ShadowFilter:

@@ -73,14 +73,17 @@ class SpooferEnv(SingleEnv):
 
     - Offset: that the spoofer means to send in the present epoch. Tracked velocity: the vehicle's, as the spoofer
       tracks it.
-    - Mean entries: the victim's filter run in expectation (Liu's eqs 32-34), with every fix used. "Last" is the
-      present epoch, "coming" the next one if the offset stays as it is; the mean errors are those after the present
-      fix is used.
+    - Mean entries: the victim's filter, or the one that `shadow` names, run in expectation (Liu's eqs 32-34), with
+      every fix used. "Last" is the present epoch, "coming" the next one if the offset stays as it is; the mean errors
+      are those after the present fix is used.
     - `knowledge="blind"` has entries 0-7 only (8 entries).
     - `knowledge="full"` adds to the 20 the victim's own whitened innovation of the present epoch (entries 20-22,
       scale 2 sigma) and, for each detector, its statistic over its threshold (entry 23, scale 1) and its threshold
       (entry 24, scale 25): 25 entries with one detector, 2 more for each further one.
     - Where the receiver gives velocity too (m = 6) every group of innovations has 6 entries instead of 3.
+    - With `frames` above 1 the observation has the entries of that many epochs, one after the other: first those of
+      the present epoch, as above, then those of one epoch ago ("offset east, 1 epoch ago"), and so on. Epochs before
+      epoch 0 show what epoch 0 showed.
 
     `spoofgym.envs.observation.spoofer_fields` gives the same list in Python, `env.unwrapped.game.fields` that of an
     environment.
@@ -133,12 +136,20 @@ class SpooferEnv(SingleEnv):
     | `response` | `"exclude"` | specification or `Response`; used with `on_alarm="respond"` only |
     | `forfeit` | `1.0` | share of the growth that an alarm takes back |
     | `tracking_sigma` | `0.0` | see below, m |
+    | `tracking_time` | `0.0` | correlation time of that error, s; 0: white |
+    | `frames` | `1` | epochs that the observation holds, the present one included |
+    | `shadow` | `None` | scenario whose filter the spoofer takes for the victim's, see below; None: the victim's own |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
-    `tracking_sigma`: the spoofer knows the vehicle's position with this white error per axis and epoch, which adds to
-    the offset that it means to send, and its velocity with an independent one over the interval. It changes what is
-    sent and seen, not how it is scored.
+    `tracking_sigma`: the spoofer knows the vehicle's position with this error per axis and epoch, which adds to the
+    offset that it means to send, and its velocity with an independent one over the interval. It changes what is sent
+    and seen, not how it is scored. Both are white, or with a `tracking_time` first-order Gauss-Markov.
+
+    `shadow`: the spoofer who does not know the victim exactly. Its shadow filter, which makes the mean entries and
+    turns the "innovation" action into an offset, has the linear model of this scenario, e.g.
+    `shadow="liu-flight:imu=tactical"`; the victim, its detectors and the score stay those of `scenario`. Both must
+    have the same epochs and the same dimension of the fix. A "blind" spoofer has no shadow filter.
 
     With `on_alarm="respond"` nothing is taken back: the return times `error_scale` is the growth of the error
     whatever was detected. The shadow filter still assumes that every fix is used.

@@ -16,11 +16,13 @@ from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.frames import FrameStack, stacked_fields
 from spoofgym.envs.observation import Squash, observation_space, spoofer_fields
-from spoofgym.envs.shadow import ShadowFilter
+from spoofgym.envs.shadow import ShadowFilter, shadow_model
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
 from spoofgym.scenarios import make_scenario
+from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 
 INNOVATION_UNIT = 4.0
@@ -86,13 +88,15 @@ class SpooferGame:
         self.num_lanes = num_lanes
         self.shadow: ShadowFilter | None = None
         if config.knowledge != "blind":
-            self.shadow = ShadowFilter(scenario.linear_model(), num_lanes, self.simulation.slices)
+            believed = scenario if config.shadow is None else make_scenario(config.shadow)
+            self.shadow = ShadowFilter(shadow_model(scenario, believed), num_lanes, self.simulation.slices)
         fields = spoofer_fields(config.knowledge, scenario.dimension, tuple(self.simulation.detectors))
-        self.fields = fields
-        self.observation_space = observation_space(fields)
+        self.fields = stacked_fields(fields, config.frames)
+        self.observation_space = observation_space(self.fields)
         self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.error = np.zeros(num_lanes)
         self._squash = Squash(fields)
+        self._frames = FrameStack(num_lanes, config.frames, len(fields))
         self._start_error = np.zeros(num_lanes)
         self.offset = np.zeros((num_lanes, 3))
         self._velocity = scenario.velocity()
@@ -115,6 +119,7 @@ class SpooferGame:
         """Start new games up to the clean epoch 0."""
         self.simulation.reset(lanes)
         self._begin(lanes)
+        self._frames.begin(lanes, self._frame()[lanes])
 
     def _begin(self, lanes: Runs) -> None:
         error = self._horizontal()[lanes]
@@ -123,10 +128,10 @@ class SpooferGame:
         self.offset[lanes] = 0.0
         self._alarmed[lanes] = False
         if self.config.tracking_sigma:
-            sigma = self.config.tracking_sigma
+            sigma, time, shape = self.config.tracking_sigma, self.config.tracking_time, self._tracking.shape[1:]
             for lane in lanes:
                 stream = self.simulation.streams(lane, "tracking")
-                self._tracking[lane] = sigma * stream.standard_normal(self._tracking.shape[1:])
+                self._tracking[lane] = draw_tracking_error(stream, shape, sigma, time, self._interval)
         if self.shadow is not None:
             self.shadow.reset(lanes)
 
@@ -171,7 +176,12 @@ class SpooferGame:
             error[restarting] = self.error[restarting]
         if self.shadow is not None:
             self.shadow.advance(epoch.index, self.offset, previous, self._interval)
-        return self._score(error)
+        outcome = self._score(error)
+        present = self._frame()
+        self._frames.push(present)
+        if restarting is not None:
+            self._frames.begin(restarting, present[restarting])
+        return outcome
 
     def _intend(self, actions: Floats, previous: Floats) -> Floats:
         """The offset that the spoofer means to send, (N, 3), m ENU."""
@@ -199,7 +209,11 @@ class SpooferGame:
         return Outcome(growth, forfeit, alarm, self._alarmed, caught | last)
 
     def observation(self) -> NDArray[np.float32]:
-        """What each lane's spoofer sees, (N, D)."""
+        """What each lane's spoofer sees, (N, frames * D)."""
+        return self._frames.observation()
+
+    def _frame(self) -> NDArray[np.float32]:
+        """The present epoch's part of it, (N, D)."""
         epoch = self.simulation.epoch
         velocity = self._velocity[epoch.index]
         if self.config.tracking_sigma:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
+from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import SimulatedScenario
 from spoofgym.sensors.imu import grade
@@ -59,6 +60,7 @@ def liu_flight(
     imu: str = "navigation",
     markov_sigma: float = 0.0,
     markov_time: float = 0.0,
+    sigma: float = 3.7,
 ) -> SimulatedScenario:
     """The Liu flight: aviation-grade INS, single-frequency GPS whose white noise has the filter's own R.
 
@@ -74,8 +76,14 @@ def liu_flight(
         markov_sigma: first-order Gauss-Markov receiver noise in the horizontal axes, m; the vertical has R's ratio;
             unknown to the filter.
         markov_time: its correlation time, s.
+        sigma: white noise of the fix per horizontal axis, m, the receiver's and the filter's alike; the vertical keeps
+            the paper's ratio, 6 / 3.7.
+
+    Raises:
+        ValueError: an unknown IMU, a number out of range, or a game outside the flight.
     """
-    sigma = (3.7, 3.7, 6.0)
+    horizontal = validation.above("liu-flight", "sigma", sigma)
+    white = (horizontal, horizontal, 6.0 * (horizontal / 3.7))
     return SimulatedScenario(
         name=spell(
             "liu-flight",
@@ -85,16 +93,17 @@ def liu_flight(
             imu=None if imu == "navigation" else imu,
             markov_sigma=markov_sigma or None,
             markov_time=markov_time or None,
+            sigma=None if sigma == 3.7 else sigma,
         ),
         trajectory=_trajectory(),
         grade=grade(imu),
         receiver=Receiver(
             rate=rate,
-            white_sigma=sigma,
-            markov_sigma=(markov_sigma, markov_sigma, markov_sigma * sigma[2] / sigma[0]),
+            white_sigma=white,
+            markov_sigma=(markov_sigma, markov_sigma, markov_sigma * white[2] / white[0]),
             markov_time=markov_time,
         ),
-        tuning=FilterTuning(measurement_sigma=sigma),
+        tuning=FilterTuning(measurement_sigma=white),
         onset=onset,
         horizon=horizon,
         drag_off_rate=(4.0, 4.0, 4.0),

@@ -52,12 +52,17 @@ def test_a_game_pays_its_survival_times_what_it_gained():
     np.testing.assert_allclose(total, survival * (environment.game.error - start) / 10.0, rtol=1e-9)
 
 
+def test_the_victim_named_as_shadow_is_known():
+    assert alarm_probability_is_known(SpooferConfig(shadow="liu-flight"))
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
         {"detector": "windowed"},
         {"knowledge": "blind"},
         {"tracking_sigma": 1.0},
+        {"shadow": "liu-flight:imu=tactical"},
         {"forfeit": 0.5},
         {"on_alarm": "respond"},
         {"scenario": "liu-flight:markov_sigma=2,markov_time=30"},

@@ -1,0 +1,66 @@
+"""Spoofers that know the victim's filter and what watches it: optimal attacks, each against a monitor of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import stats
+
+from agents.scripted import OffsetSequence
+from spoofgym.attacks.base import Attack
+from spoofgym.calibration import calibrated
+from spoofgym.detectors import make_detector
+from spoofgym.detectors.chi_square import quantile
+from spoofgym.optimum import LinearTest, bounded_optimum, cumulative_optimum, ewma, gate, window_mean, zero_alarm
+from spoofgym.scenario import Scenario
+
+MEANS = (10, 30, 60)
+WEIGHTS = (0.02, 0.05, 0.1)
+MISSED = 0.5
+"""Share of the games in which the worst case against a window is missed by it."""
+
+
+def oracles(scenario: Scenario, arl0: float) -> list[Attack]:
+    """Optimal attacks against monitors at an ARL₀; none where the filter is not matched or fixes have velocity.
+
+    - ``best-against-snapshot``: the bounded optimum of the game against the chi-square test of each epoch.
+    - ``worst-against-window``: the closed form that the chi-square test of a window as long as the game misses in half
+      of the games.
+    - ``zero-alarm-gate``: the linear programme against a gate on each axis, its mean within 30 % of the thresholds.
+    - ``zero-alarm-signed``: the same against the gate, means of 10, 30 and 60 innovations and three EWMAs together.
+
+    Args:
+        scenario: of the games.
+        arl0: of every monitor by itself, epochs.
+    """
+    if not scenario.matched or scenario.dimension != 3:
+        return []
+    model, rates = scenario.linear_model(), np.array(scenario.drag_off_rate)
+    best = bounded_optimum(model, quantile(1.0 / arl0, 3), rates)
+    epochs = model.num_epochs
+    window, _ = cumulative_optimum(model, epochs, _threshold(f"windowed:n={epochs}", scenario, arl0), MISSED)
+    gates = gate(float(stats.norm.isf(1.0 / (6.0 * arl0))))
+    return [
+        OffsetSequence("best-against-snapshot", best.outcome.offsets),
+        OffsetSequence("worst-against-window", window.offsets),
+        OffsetSequence("zero-alarm-gate", zero_alarm(model, gates, drag_off_rate=rates).offsets),
+        OffsetSequence(
+            "zero-alarm-signed",
+            zero_alarm(model, [*gates, *signed_tests(scenario, arl0)], drag_off_rate=rates).offsets,
+        ),
+    ]
+
+
+def signed_tests(scenario: Scenario, arl0: float) -> list[LinearTest]:
+    """Means of windows and EWMAs of each axis, at the thresholds that these detectors have in the scenario."""
+    tests = []
+    for n in MEANS:
+        tests += window_mean(n, _threshold(f"mean-innovation:n={n}", scenario, arl0))
+    for weight in WEIGHTS:
+        tests += ewma(weight, _threshold(f"ewma:weight={weight}", scenario, arl0))
+    return tests
+
+
+def _threshold(detector: str, scenario: Scenario, arl0: float) -> float:
+    ready = calibrated(make_detector(f"{detector},arl0={arl0:g}"), scenario)
+    assert ready.threshold is not None
+    return ready.threshold
