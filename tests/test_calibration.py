@@ -12,6 +12,7 @@ from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_in
 from spoofgym.clean_statistics import white_statistics
 from spoofgym.detectors import Acna, Snapshot, Windowed, make_detector
 from spoofgym.first_alarms import FirstAlarms
+from spoofgym.navigation.facts import FilterFacts
 
 UNLIKELY = 1e-7
 WHITE = white_statistics(np.eye(3), 200)
@@ -120,6 +121,7 @@ def scenario_of(factor, *, matched=True, num_epochs=120):
         matched=matched,
         timeline=SimpleNamespace(num_epochs=num_epochs),
         linear_model=lambda: SimpleNamespace(innovation_factor=factors),
+        facts=FilterFacts("stub", 1.0, np.ones(6), (), lambda burn_in: None),
     )
 
 

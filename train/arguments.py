@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 PICTURES = (".png", ".svg", ".pdf")
@@ -27,6 +28,17 @@ def seed_number(text: str) -> int:
         raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}") from None
     if value < 0:
         raise argparse.ArgumentTypeError(f"a seed is 0 or more, got {text!r}")
+    return value
+
+
+def above_one(text: str) -> float:
+    """A finite number greater than 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number, got {text!r}") from None
+    if not 1.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a finite number greater than 1, got {text!r}")
     return value
 
 

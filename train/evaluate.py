@@ -1,8 +1,9 @@
-"""Evaluate spoofers against a detector, or defenders against populations of spoofers.
+"""Evaluate spoofers against a detector, defenders against populations, or every detector against every attack.
 
     python -m train.evaluate --scenario liu-flight --detector snapshot --attacker runs/x --seed 0 --json out.json
     python -m train.evaluate --scenario recorded:FOLDER --attack ramp:0.5 --detector snapshot --json -
     python -m train.evaluate --scenario foi-drive --defender runs/d --json out.json --figure out.png
+    python -m train.evaluate --matrix --scenario liu-flight --arl0 10000 --json out.json --figure out.png
 
 The baselines are always evaluated: none, random, the best constant ramp, the closed form, the optimum, and the upper
 bound as a figure. Every attacker meets the same noise. A table goes to the terminal, a figure and JSON where asked;
@@ -31,36 +32,53 @@ from spoofgym.evaluation.report import attackers_report, recorded_report
 from spoofgym.scenario import FIDELITIES, Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded import RecordedScenario
-from train.arguments import count, picture, seed_number
+from train.arguments import above_one, count, picture, seed_number
 from train.attackers import Evaluation
 from train.defenders import POPULATIONS, evaluate_defenders
 from train.defenders_presentation import defenders_figure, defenders_tables
+from train.matrix import Matrix
+from train.matrix_presentation import curves_figure, matrix_figure, matrix_tables
 from train.presentation import attackers_figure, attackers_table, recorded_table
 
 EPISODES = {"linear": 20_000, "strapdown": 1_000}
 DEFENDER_EPISODES = 4_000
-TABLES = {"attackers": attackers_table, "recorded": recorded_table, "defenders": defenders_tables}
-FIGURES = {"attackers": attackers_figure, "defenders": defenders_figure}
+MATRIX_EPISODES = {"linear": 4_000, "strapdown": 500}
+MATRIX_ARL0 = 1e4
+TABLES = {
+    "attackers": attackers_table,
+    "recorded": recorded_table,
+    "defenders": defenders_tables,
+    "matrix": matrix_tables,
+}
+FIGURES = {"attackers": attackers_figure, "defenders": defenders_figure, "matrix": matrix_figure}
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = argparse.ArgumentParser(
         prog="python -m train.evaluate",
-        description="Evaluate spoofers against a detector, beside baselines and the exact optimum; or, with "
-        "--defender, defenders against populations of spoofers.",
+        description="Evaluate spoofers against a detector, beside baselines and the exact optimum; with --defender, "
+        "defenders against populations of spoofers; with --matrix, every detector against every attack.",
     )
     add = result.add_argument
     add("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
     add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
     add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
+    add("--shadow", metavar="SPEC",
+        help="scenario whose filter every attacker takes for the victim's, in place of the one it was trained with")
     add("--defender", action="append", default=[], metavar="RUN|SPEC",
         help="run folder of a trained defender, or 'detector > response'; repeatable; evaluates defenders instead")
     add("--population", action="append", choices=tuple(POPULATIONS),
         help="of attacks on the defenders; repeatable (default: all)")
+    add("--matrix", action="store_true",
+        help="every --detector against every --attack and --attacker at an equal false-alarm rate (default: all)")
+    add("--arl0", type=above_one, help="of the matrix, epochs between false alarms (default: 10000)")
+    add("--roc", type=picture, metavar="FILE", help="with --matrix: draw ROC and DET curves of one attack")
+    add("--roc-attack", default="ramp:0.2", help="which attack of the matrix that is (default: %(default)s)")
     add("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
-    add("--episodes", type=count, help="games of each player (default: 20000 linear, 1000 strapdown; defenders 4000)")
+    add("--episodes", type=count,
+        help="games of each player (default: 20000 linear, 1000 strapdown; defenders and matrix 4000)")
     add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
     add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
     add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
@@ -82,6 +100,10 @@ def main(arguments: list[str] | None = None) -> int:
         options.figure.parent.mkdir(parents=True, exist_ok=True)
         FIGURES[report["kind"]](report, options.figure)
         console.print(f"figure in {options.figure}", markup=False)
+    if options.roc is not None:
+        options.roc.parent.mkdir(parents=True, exist_ok=True)
+        curves_figure(report, options.roc_attack, options.roc)
+        console.print(f"curves in {options.roc}", markup=False)
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
     elif options.json is not None:
@@ -98,6 +120,12 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     scenario.check_fidelity(fidelity)
     if options.population and not options.defender:
         raise ValueError("--population is of attacks on defenders: it goes with --defender")
+    if options.shadow is not None and not options.attacker:
+        raise ValueError("--shadow replaces the shadow filter of learned spoofers: it goes with --attacker")
+    if not options.matrix and (options.arl0 is not None or options.roc is not None):
+        raise ValueError("--arl0 and --roc are of the matrix: they go with --matrix")
+    if options.matrix:
+        return _matrix(options, scenario, fidelity, console)
     if options.defender:
         return _defenders(options, scenario, fidelity, console)
     given = options.detector or ["snapshot"]
@@ -105,6 +133,8 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     if isinstance(scenario, RecordedScenario):
         return _recorded(options, scenario, detectors)
     policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
+    if options.shadow is not None:
+        policies = [policy.with_shadow(options.shadow) for policy in policies]
     evaluation = Evaluation(
         scenario,
         tuple(given),
@@ -118,6 +148,28 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     attacks = [make_attack(text) for text in options.attack]
     rows = evaluation.rows(policies, attacks, console)
     return attackers_report(scenario, fidelity, detectors, rows)
+
+
+def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, console: Console) -> dict[str, Any]:
+    if options.defender or not scenario.random:
+        raise ValueError("--matrix is of detectors and attacks in a simulated scenario: no --defender, no recorded log")
+    policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
+    if options.shadow is not None:
+        policies = [policy.with_shadow(options.shadow) for policy in policies]
+    matrix = Matrix(
+        scenario,
+        fidelity,
+        options.arl0 or MATRIX_ARL0,
+        options.episodes or MATRIX_EPISODES[fidelity],
+        options.seed,
+        options.threads,
+    )
+    if options.roc is not None and options.roc_attack not in matrix.names(options.attack, policies):
+        raise ValueError(
+            f"--roc-attack {options.roc_attack!r} is not in the matrix; there are: "
+            f"{', '.join(matrix.names(options.attack, policies))}"
+        )
+    return matrix.report(options.detector or (), options.attack, policies, console)
 
 
 def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, console: Console) -> dict[str, Any]:

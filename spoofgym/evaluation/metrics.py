@@ -10,6 +10,7 @@ import numpy as np
 from spoofgym.arrays import Floats
 from spoofgym.evaluation.monte_carlo import Episodes
 
+CONFIDENCE = 0.95
 NORMAL_95 = 1.959963984540054
 
 

@@ -1,0 +1,99 @@
+"""Thresholds of detectors in a scenario, at several average run lengths between false alarms.
+
+    python -m spoofgym.evaluation.thresholds --scenario liu-flight --arl0 1e3 1e4 1e5
+    python -m spoofgym.evaluation.thresholds --detector cusum --detector ewma --json -
+
+A threshold that theory gives has an ARL₀ without an interval. What was found is kept on disk (`calibration_cache`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from spoofgym.calibration import calibrated_all
+from spoofgym.detectors import DETECTORS, at_arl0, make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios import make_scenario
+
+DEFAULT_ARL0S = (1e3, 1e4, 1e5)
+
+
+def threshold_rows(scenario: Scenario, detectors: Sequence[str], arl0s: Sequence[float]) -> list[dict[str, Any]]:
+    """A row for each detector and ARL₀.
+
+    Args:
+        scenario: in which thresholds hold.
+        detectors: specifications without a threshold.
+        arl0s: wanted, epochs.
+
+    Raises:
+        ValueError: a detector that is unknown or does not fit the scenario, or an ARL₀ that is not greater than 1.
+    """
+    rows = []
+    for arl0 in arl0s:
+        asked = [make_detector(at_arl0(text, arl0)) for text in detectors]
+        for text, detector in zip(detectors, calibrated_all(asked, scenario), strict=True):
+            rows.append(_row(text, arl0, detector))
+    return sorted(rows, key=lambda row: detectors.index(row["detector"]))
+
+
+def _row(text: str, arl0: float, detector: Detector) -> dict[str, Any]:
+    interval = detector.arl0_interval
+    return {
+        "detector": text,
+        "asked_arl0": arl0,
+        "threshold": detector.threshold,
+        "arl0": detector.arl0,
+        "ci95": None if interval is None else list(interval),
+        "from": "clean runs" if detector.calibrated else "theory or a preset",
+    }
+
+
+def _line(row: dict[str, Any]) -> str:
+    interval = "" if row["ci95"] is None else f"  95 % [{row['ci95'][0]:.4g}, {row['ci95'][1]:.4g}]"
+    reached = "unknown" if row["arl0"] is None else f"{row['arl0']:.4g}"
+    given = f"{row['detector']:<28}{row['asked_arl0']:>10g}{row['threshold']:>12.5g}"
+    return f"{given}  ARL0 {reached}{interval}  ({row['from']})"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = argparse.ArgumentParser(
+        prog="python -m spoofgym.evaluation.thresholds",
+        description="Thresholds of detectors at several average run lengths between false alarms.",
+    )
+    add = result.add_argument
+    add("--scenario", default="liu-flight", help="in which they hold (default: %(default)s)")
+    add("--detector", action="append", help="repeatable (default: every family)")
+    add("--arl0", type=float, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
+    add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    try:
+        scenario = make_scenario(options.scenario)
+        rows = threshold_rows(scenario, options.detector or list(DETECTORS), options.arl0)
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    for row in rows:
+        print(_line(row), file=sys.stderr if options.json == "-" else sys.stdout)
+    report = {"schema_version": 1, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
+    if options.json == "-":
+        print(json.dumps(report))
+    elif options.json is not None:
+        with open(options.json, "w", encoding="utf-8") as file:
+            file.write(json.dumps(report, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
