@@ -191,10 +191,15 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
     What was found is remembered for each scenario and detector: in the program, and on disk (`calibration_cache`) where
     the names of both say all about them.
 
+    The members of a detector are calibrated before it.
+
     Raises:
-        ValueError: calibration is needed, and the scenario lacks the fidelity or has no randomness to calibrate with.
+        ValueError: calibration is needed, and the scenario lacks the fidelity or has no randomness to calibrate with;
+            or a detector needs what the scenario does not offer.
     """
+    detectors = [_with_members(detector, scenario, fidelity) for detector in detectors]
     for detector in detectors:
+        scenario.facts.require(f"detector {detector.name!r}", detector.needs)
         detector.bind(1, scenario.dimension)
     wanted = [detector for detector in detectors if _needs_calibration(detector, scenario)]
     if wanted and not scenario.random:
@@ -212,6 +217,14 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
         _with(detector, _KNOWN[detector.name, scenario.name, fidelity]) if detector in wanted else detector
         for detector in detectors
     ]
+
+
+def _with_members(detector: Detector, scenario: Scenario, fidelity: str) -> Detector:
+    if not detector.members or detector.calibrated:
+        return detector
+    ready = copy.copy(detector)
+    ready.members = calibrated_all(detector.members, scenario, fidelity)
+    return ready
 
 
 def _needs_calibration(detector: Detector, scenario: Scenario) -> bool:
@@ -248,7 +261,10 @@ def _with(detector: Detector, setting: Setting) -> Detector:
     if setting.slope is not None:
         ready.set_slope(setting.slope)
     if setting.threshold is not None:
-        ready.set_threshold(setting.threshold, setting.arl0)
+        interval = None
+        if setting.low is not None:
+            interval = setting.low, math.inf if setting.high is None else setting.high
+        ready.set_threshold(setting.threshold, setting.arl0, interval)
     return ready
 
 
@@ -258,9 +274,10 @@ def _find(detectors: Sequence[Detector], scenario: Scenario, fidelity: str) -> d
     groups: dict[int, list[Detector]] = {}
     for detector in detectors:
         if scenario.matched and not detector.needs_view and detector.target_arl0 is not None:
-            clean = white_statistics(scenario.linear_model().innovation_factor[0], scenario.timeline.num_epochs)
+            factor = scenario.linear_model().innovation_factor[0]
+            clean = white_statistics(factor, scenario.timeline.num_epochs, scenario.facts)
             result = calibrate(detector, clean, detector.target_arl0)
-            found[detector.name] = Setting(result.threshold, result.arl0)
+            found[detector.name] = _setting(result, None)
         else:
             # a burn-in of the filter that a companion asks for would change the runs
             groups.setdefault(0 if scenario.matched else detector.memory, []).append(detector)
@@ -283,8 +300,13 @@ def _find_simulated(detectors: Sequence[Detector], scenario: Scenario, fidelity:
     arl0s = [detector.target_arl0 for detector in asked if detector.target_arl0 is not None]
     results = calibrate_together(asked, clean, arl0s, first_alarms=SIMULATED_FIRST_ALARMS)
     for detector, result in zip(asked, results, strict=True):
-        found[detector.name] = Setting(result.threshold, result.arl0, slopes.get(detector.name))
+        found[detector.name] = _setting(result, slopes.get(detector.name))
     return found
+
+
+def _setting(result: Calibration, slope: float | None) -> Setting:
+    low, high = result.interval
+    return Setting(result.threshold, result.arl0, slope, low, high if math.isfinite(high) else None)
 
 
 def growth(detector: Detector, time: Floats, statistics: Floats) -> float:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import spoofgym
-from spoofgym.detectors import DETECTORS, make_detector
+from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -41,11 +41,15 @@ class Setting:
         threshold: None where the detector has its own.
         arl0: measured at the threshold, epochs.
         slope: growth of the statistic along clean runs, per second; None where none is subtracted.
+        low: lower end of the 95 % interval of the ARL₀, epochs.
+        high: upper end; None where it is unbounded.
     """
 
     threshold: float | None = None
     arl0: float | None = None
     slope: float | None = None
+    low: float | None = None
+    high: float | None = None
 
 
 def _source() -> str:
@@ -114,8 +118,12 @@ def store(name: str, setting: Setting, remark: str) -> None:
 
 
 def spelled_out(detector: Detector) -> bool:
-    """Whether the name of a detector builds another one like it."""
-    return type(detector) in DETECTORS.values() and type(make_detector(detector.name)) is type(detector)
+    """Whether the name of a detector builds another one like it, from the source that decides a result."""
+    try:
+        other = make_detector(detector.name)
+    except ValueError:
+        return False
+    return type(other) is type(detector) and type(other).__module__.startswith("spoofgym.detectors.")
 
 
 def spelled_out_scenario(scenario: Scenario) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -21,17 +22,20 @@ JointStatistics = Callable[[Sequence[Detector], int, np.random.Generator], list[
 """The same of several detectors on the same clean runs."""
 
 
-def white_statistics(factor: Floats, num_epochs: int) -> CleanStatistics:
+def white_statistics(factor: Floats, num_epochs: int, facts: FilterFacts | None = None) -> CleanStatistics:
     """Statistics on the innovations of a matched filter, which are white: residual = L n.
 
     Args:
         factor: L, lower, (m, m).
         num_epochs: K, of a run.
+        facts: of the filter, for detectors that ask for them.
     """
     m = len(factor)
 
     def statistics(detector: Detector, runs: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         detector.bind(runs, m)
+        if facts is not None:
+            detector.know(facts)
         covariance = np.broadcast_to(factor @ factor.T, (runs, m, m))
         kept = np.empty((runs, detector.memory + num_epochs))
         for k in range(kept.shape[1]):
@@ -67,9 +71,9 @@ class _BurnIn(Detector):
         self._detector.bind(num_runs, dimension)
         self.peak = np.full(num_runs, -math.inf)
 
-    def know(self, bias_sigma: Floats) -> None:
+    def know(self, facts: FilterFacts) -> None:
         """Tell the detector."""
-        self._detector.know(bias_sigma)
+        self._detector.know(facts)
 
     def take(self, runs: Runs, other: Detector) -> None:
         """Copy the peaks and what the detector remembers."""

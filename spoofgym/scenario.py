@@ -10,6 +10,9 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
+from spoofgym.navigation.adaptation import Adaptation
+from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
+from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Timeline, manoeuvre_times
 from spoofgym.navigation.linear import LinearNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
@@ -25,6 +28,8 @@ from spoofgym.streams import RunStreams
 from spoofgym.trajectory import Trajectory
 
 FIDELITIES = ("linear", "strapdown")
+ROUNDING = 1e-9
+"""Times closer than this are the same, s."""
 
 
 class Scenario(ABC):
@@ -42,6 +47,7 @@ class Scenario(ABC):
         bias_sigma: data-sheet bias of the IMU's gyros and accelerometers, constant and unstable part together, (6,),
             rad/s and m/s².
         fidelities: the valid ones.
+        offers: what its navigator gives to monitors beside innovations.
         matched: whether the filter's model is the truth, so that clean innovations are white.
         random: whether every episode is drawn anew; a recorded log has one realisation.
     """
@@ -55,6 +61,7 @@ class Scenario(ABC):
     depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
     history: int = 60
     fidelities: tuple[str, ...] = FIDELITIES
+    offers: tuple[str, ...] = (INERTIAL_SOLUTION, LINEAR_MODEL)
     matched: bool
     random: bool = True
 
@@ -62,6 +69,11 @@ class Scenario(ABC):
     @abstractmethod
     def bias_sigma(self) -> Floats:
         """Data-sheet bias of the IMU, (6,), rad/s and m/s²."""
+
+    @property
+    def facts(self) -> FilterFacts:
+        """What the designer of the filter knows."""
+        return FilterFacts(self.name, self.timeline.interval, self.bias_sigma, self.offers, self.linear_model)
 
     def manoeuvres(self) -> tuple[float, ...]:
         """Times within the game at which the vehicle begins to change its velocity, s."""
@@ -137,6 +149,8 @@ class SimulatedScenario(Scenario):
         defender_scale: metres of error that cost a defender 1.
         depth_table: depths among which a defender chooses, epochs.
         true_position_random_walk: what really acts on the INS position, m/√s.
+        adaptation: how the filter tunes itself from the first epoch of a burn-in or a game on; None = a filter with
+            constant R and Q. `warm_start` and `linear_model` are of that filter, whatever the adaptation.
     """
 
     name: str
@@ -151,12 +165,13 @@ class SimulatedScenario(Scenario):
     true_position_random_walk: float
     defender_scale: float = 10.0
     depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
+    adaptation: Adaptation | None = None
 
     def __post_init__(self) -> None:
         if self.horizon < 1:
             raise ValueError(f"horizon must be 1 epoch or more, got {self.horizon}")
         first, last = 2 * self.receiver.interval, self.trajectory.time[-1] - self.horizon * self.receiver.interval
-        if not first <= self.onset <= last:
+        if not first - ROUNDING <= self.onset <= last + ROUNDING:
             raise ValueError(
                 f"onset {self.onset:g} s with a horizon of {self.horizon} epochs does not fit the trajectory of "
                 f"{self.trajectory.time[-1]:g} s: valid from {first:g} to {last:g} s"
@@ -192,7 +207,8 @@ class SimulatedScenario(Scenario):
         that the fixes hardly observe.
         """
         return (
-            not any(self.receiver.markov_sigma)
+            self.adaptation is None
+            and not any(self.receiver.markov_sigma)
             and np.allclose(self.receiver.white_deviation, self.tuning.measurement_sigma, rtol=1e-12)
             and not np.any(self.grade.instability_sigma)
             and self.true_position_random_walk == self.tuning.position_random_walk
@@ -252,7 +268,7 @@ class SimulatedScenario(Scenario):
 
     @cache  # noqa: B019 - scenarios live as long as the program
     def linear_model(self, burn_in: int = 0) -> LinearModel:
-        """The game in the linear fidelity, from epoch -burn_in on."""
+        """The game in the linear fidelity, from epoch -burn_in on, under the filter with constant R and Q."""
         first = round(self.onset * self.receiver.rate) - 1 - burn_in
         timeline = Timeline(
             self.onset - burn_in * self.receiver.interval, self.receiver.interval, self.horizon + burn_in
@@ -265,9 +281,13 @@ class SimulatedScenario(Scenario):
     ) -> Navigator:
         """A navigator whose model starts ``burn_in`` epochs before epoch 0; arguments as in `Scenario`."""
         self.check_fidelity(fidelity)
+        interval = self.receiver.interval
         if fidelity == "linear":
+            linear = self.linear_model(burn_in)
+            if self.adaptation is not None:
+                return AdaptiveNavigator(linear, self.grade, interval, num_runs, slices, self.adaptation, demands)
             kind = OwnCovarianceNavigator if demands.excludes else LinearNavigator
-            return kind(self.linear_model(burn_in), self.grade, self.receiver.interval, num_runs, slices, demands)
+            return kind(linear, self.grade, interval, num_runs, slices, demands)
         model = strapdown_model(
             self.trajectory,
             self.grade,
@@ -275,8 +295,10 @@ class SimulatedScenario(Scenario):
             self.tuning,
             self.true_position_random_walk,
             self.warm_start(burn_in).filter_covariance,
-            Timeline(self.times(burn_in)[0], self.receiver.interval, self.horizon + burn_in),
+            Timeline(self.times(burn_in)[0], interval, self.horizon + burn_in),
         )
+        if self.adaptation is not None:
+            return AdaptiveStrapdownNavigator(model, num_runs, slices, self.adaptation, demands)
         return StrapdownNavigator(model, num_runs, slices, demands)
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
+from spoofgym.navigation.facts import LINEAR_MODEL
 from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
@@ -68,7 +69,7 @@ class Simulation:
 
         Raises:
             ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the
-                game.
+                game, or a part that needs what the scenario does not give.
         """
         if num_runs < 1:
             raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
@@ -82,6 +83,9 @@ class Simulation:
         if attack is not None:
             attack.bind(scenario.timeline, num_runs)
             attack.follow(scenario.velocity())
+            if attack.needs_model:
+                scenario.facts.require(f"attack {attack.name!r}", (LINEAR_MODEL,))
+                attack.study(scenario.linear_model())
         self.response = response
         if response is not None:
             response.bind(num_runs)
@@ -111,7 +115,8 @@ class Simulation:
     def _bind_detectors(self) -> None:
         for detector in self.detectors.values():
             detector.bind(self.num_runs, self.scenario.dimension)
-            detector.know(self.scenario.bias_sigma)
+            self.scenario.facts.require(f"detector {detector.name!r}", detector.needs)
+            detector.know(self.scenario.facts)
             if detector.threshold is None:
                 raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
 

@@ -2,17 +2,46 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from dataclasses import replace
 
+from spoofgym.detectors.acceleration import Acceleration
 from spoofgym.detectors.acna import Acna
+from spoofgym.detectors.aime import Aime
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.bias_range import BiasRange
 from spoofgym.detectors.chi_square import Snapshot, Windowed
+from spoofgym.detectors.cusum import Cusum, SignedCusum
+from spoofgym.detectors.ensemble import Ensemble
+from spoofgym.detectors.ewma import Ewma, Mewma
+from spoofgym.detectors.gates import ArduPilotGate, Px4Gate
 from spoofgym.detectors.growing_window import GrowingWindow
 from spoofgym.detectors.mean_innovation import MeanInnovation
+from spoofgym.detectors.moving_average import FiniteMovingAverage
+from spoofgym.detectors.ramp_bank import RampBank
 from spoofgym.detectors.relative_motion import RelativeMotion
+from spoofgym.detectors.rio import Rio
 from spoofgym.detectors.signed_mean import SignedMean
-from spoofgym.specification import build
+from spoofgym.detectors.solution_separation import SolutionSeparation
+from spoofgym.detectors.whiteness import Whiteness
+from spoofgym.detectors.window_bank import WindowBank
+from spoofgym.specification import Specification, build, unnest
+
+SETS_THRESHOLD = ("threshold", "p_fa", "preset", "arl0", "jump_threshold", "slow_threshold", "gate", "factor")
+"""Options that decide the threshold of a detector."""
+
+
+ENSEMBLE = "snapshot+cusum+signed-mean:n=30+signed-cusum+mewma"
+"""Members of an ensemble that is named without any."""
+
+
+def _ensemble(members: str = ENSEMBLE, threshold: float | None = None, arl0: float | None = None) -> Ensemble:
+    """The ensemble of members spelled ``detector+detector``, each with ``/`` in place of its commas."""
+    names = [unnest(member) for member in members.split("+")]
+    asked = Ensemble.default_arl0 if arl0 is None else arl0
+    return Ensemble([make_detector(at_arl0(name, asked)) for name in names], threshold, arl0)
+
 
 DETECTORS: dict[str, Callable[..., Detector]] = {
     "snapshot": Snapshot,
@@ -23,7 +52,38 @@ DETECTORS: dict[str, Callable[..., Detector]] = {
     "relative-motion": RelativeMotion,
     "growing-window": GrowingWindow,
     "bias-range": BiasRange,
+    "window-bank": WindowBank,
+    "aime": Aime,
+    "cusum": Cusum,
+    "signed-cusum": SignedCusum,
+    "ewma": Ewma,
+    "mewma": Mewma,
+    "fma": FiniteMovingAverage,
+    "whiteness": Whiteness,
+    "ramp-bank": RampBank,
+    "solution-separation": SolutionSeparation,
+    "acceleration": Acceleration,
+    "px4-gate": Px4Gate,
+    "ardupilot-gate": ArduPilotGate,
+    "rio": Rio,
+    "ensemble": _ensemble,
 }
+
+
+def at_arl0(text: str, arl0: float) -> str:
+    """The specification of a detector at an ARL0, where it has one and no option that decides its threshold is given.
+
+    Raises:
+        ValueError: unknown name.
+    """
+    specification = Specification.parse(text)
+    decided = any(option in specification.options for option in SETS_THRESHOLD)
+    factory = DETECTORS.get(specification.name)
+    if factory is None:
+        raise ValueError(f"unknown detector {specification.name!r}; valid names: {', '.join(sorted(DETECTORS))}")
+    if decided or "arl0" not in inspect.signature(factory).parameters:
+        return text
+    return str(replace(specification, options={**specification.options, "arl0": f"{arl0:g}"}))
 
 
 def make_detector(detector: str | Detector) -> Detector:

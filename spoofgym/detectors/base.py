@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs, take_runs
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
+from spoofgym.specification import spell
 
 
 class Detector(ABC):
@@ -20,10 +24,13 @@ class Detector(ABC):
         threshold: alarm where statistic > threshold; None until `bind` or calibration sets it.
         arl0: the average run length between false alarms at the threshold, in epochs; None if unknown. Unless
             ``calibrated`` it holds for white innovations (a matched filter) only.
+        arl0_interval: its 95 % interval, epochs; None unless ``calibrated``.
         target_arl0: the ARL0 that was asked for, to which calibration sets the threshold; None if the threshold was
             given otherwise.
         calibrated: the threshold was set on clean runs, and ``arl0`` holds where they came from.
         demands: what it asks of the navigator beside innovations, e.g. an unaided inertial solution.
+        needs: what the scenario must offer beside innovations, e.g. a linear model of the filter.
+        members: detectors within this one, which are calibrated before it.
         needs_view: it reads the epoch's view, so that only simulated runs can calibrate it.
         lacks_slope: its statistic grows along clean runs, and `set_slope` has not told yet how fast.
         memory: epochs that the statistic looks back, the present one left out; a warm start needs as many clean epochs.
@@ -31,9 +38,12 @@ class Detector(ABC):
 
     threshold: float | None = None
     arl0: float | None = None
+    arl0_interval: tuple[float, float] | None = None
     target_arl0: float | None = None
     calibrated: bool = False
     demands: Demands = Demands()
+    needs: tuple[str, ...] = ()
+    members: Sequence[Detector] = ()
     needs_view: bool = False
     lacks_slope: bool = False
     memory: int = 0
@@ -46,8 +56,12 @@ class Detector(ABC):
     def bind(self, num_runs: int, dimension: int) -> None:  # noqa: B027 - a snapshot needs no memory
         """Allocate the memory of ``num_runs`` runs for fixes of ``dimension`` m (3 or 6)."""
 
-    def know(self, bias_sigma: Floats) -> None:  # noqa: B027 - most tests do without
-        """Learn, after `bind`, the data-sheet biases of gyros and accelerometers, (6,), rad/s and m/s²."""
+    def know(self, facts: FilterFacts) -> None:  # noqa: B027 - most tests do without
+        """Learn, after `bind`, what the designer of the filter knows.
+
+        Raises:
+            ValueError: the scenario does not fit.
+        """
 
     def reset(self, runs: Runs) -> None:  # noqa: B027 - a snapshot has nothing to forget
         """Forget everything about these runs."""
@@ -56,14 +70,21 @@ class Detector(ABC):
     def update(self, epoch: Epoch) -> Floats:
         """The statistic after this epoch, (N,)."""
 
-    def set_threshold(self, threshold: float, arl0: float | None = None) -> None:
+    def set_threshold(
+        self, threshold: float, arl0: float | None = None, interval: tuple[float, float] | None = None
+    ) -> None:
         """Take a threshold from calibration, and the ARL0 that was measured at it; a later `bind` keeps both.
+
+        Args:
+            threshold: compared with the statistic.
+            arl0: measured at it, epochs.
+            interval: its 95 % interval, epochs.
 
         Raises:
             ValueError: the threshold is not a positive finite number.
         """
         self.threshold = validation.above(self.name, "threshold", threshold)
-        self.arl0 = arl0
+        self.arl0, self.arl0_interval = arl0, interval
         self.calibrated = True
 
     def set_slope(self, slope: float) -> None:
@@ -81,3 +102,43 @@ class Detector(ABC):
         their memory.
         """
         take_runs(self, runs, other)
+
+
+class ThresholdDetector(Detector):
+    """A detector whose threshold is given by hand, or by the ARL0 that calibration attains: what most families share.
+
+    A subclass names its ``kind`` and hands its options to `set_up`, under the names of its constructor's parameters.
+    """
+
+    kind: str
+    default_arl0: float = 1e5
+
+    def set_up(
+        self, threshold: float | None, arl0: float | None, value: object = None, **options: object
+    ) -> None:
+        """Take threshold or ARL0, and form the name from the options that are not the constructor's defaults.
+
+        Args:
+            threshold: by hand.
+            arl0: to be attained; None beside no threshold = the family's default.
+            value: what stands first in the name, without a key.
+            options: the others.
+
+        Raises:
+            ValueError: both are given, or one is out of range.
+        """
+        validation.at_most_one(self.kind, threshold=threshold, arl0=arl0)
+        if threshold is not None:
+            self.threshold = validation.above(self.kind, "threshold", threshold)
+        else:
+            given = self.default_arl0 if arl0 is None else arl0
+            self.target_arl0 = validation.above(self.kind, "arl0", given, 1.0)
+        parameters = inspect.signature(type(self).__init__).parameters
+        other = {key: value for key, value in options.items() if value != parameters[key].default}
+        asked = None if self.target_arl0 == self.default_arl0 else self.target_arl0
+        self._name = spell(self.kind, value, **other, threshold=self.threshold, arl0=asked)
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this detector."""
+        return self._name

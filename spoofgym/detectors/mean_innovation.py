@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
-from spoofgym.detectors.base import Detector
-from spoofgym.detectors.ring import Ring
+from spoofgym.detectors.base import ThresholdDetector
+from spoofgym.detectors.ring import MovingSum
 from spoofgym.navigation.interface import Epoch
-from spoofgym.specification import spell
 
 DEFAULT_WINDOW = 20
-DEFAULT_ARL0 = 1e5
 
 
-class MeanInnovation(Detector):
+class MeanInnovation(ThresholdDetector):
     """Alarm where the mean innovation of any axis is too large for its standard deviation (Liu 2018, sections 4.2, 5).
 
     Liu gives the principle, a test of each component's mean, because a spoofed component then shows by itself; window
@@ -38,46 +38,32 @@ class MeanInnovation(Detector):
         ValueError: both of the last two are given, or a value is out of range.
     """
 
-    def __init__(self, n: int = DEFAULT_WINDOW, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.n = validation.whole("mean-innovation", "n", n, 1)
-        self.memory = self.n - 1
-        validation.at_most_one("mean-innovation", threshold=threshold, arl0=arl0)
-        if threshold is not None:
-            self.threshold = validation.above("mean-innovation", "threshold", threshold)
-        else:
-            self.target_arl0 = validation.above("mean-innovation", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
-        self._name = spell(
-            "mean-innovation",
-            n=None if self.n == DEFAULT_WINDOW else self.n,
-            threshold=self.threshold,
-            arl0=None if self.target_arl0 == DEFAULT_ARL0 else self.target_arl0,
-        )
+    kind = "mean-innovation"
 
-    @property
-    def name(self) -> str:
-        """The specification that builds this detector."""
-        return self._name
+    def __init__(self, n: int = DEFAULT_WINDOW, threshold: float | None = None, arl0: float | None = None) -> None:
+        self.n = validation.whole(self.kind, "n", n, 1)
+        self.memory = self.n - 1
+        self.set_up(threshold, arl0, n=self.n)
 
     def bind(self, num_runs: int, dimension: int) -> None:
-        """Allocate the windows of innovations and of their variances."""
-        self._residual = Ring(num_runs, self.n, dimension)
-        self._variance = Ring(num_runs, self.n, dimension)
+        """Allocate the window of innovations, their variances, and the number of fixes."""
+        self._sum = MovingSum(num_runs, self.n, 2 * dimension + 1)
+        self._newest = np.empty((num_runs, 2 * dimension + 1))
 
     def reset(self, runs: Runs) -> None:
         """Empty the windows of these runs."""
-        self._residual.reset(runs)
-        self._variance.reset(runs)
+        self._sum.reset(runs)
 
     def update(self, epoch: Epoch) -> Floats:
         """The largest mean over its standard deviation, (N,); 0 where the window has no fix."""
-        residual = epoch.innovation.residual
-        variance = np.diagonal(epoch.innovation.covariance, axis1=1, axis2=2)
+        m, newest = epoch.innovation.residual.shape[1], self._newest
+        newest[:, :m] = epoch.innovation.residual
+        newest[:, m:-1] = np.diagonal(epoch.innovation.covariance, axis1=1, axis2=2)
+        newest[:, -1] = 1.0
         if epoch.available is not None:
-            residual = np.where(epoch.available[:, None], residual, 0.0)
-            variance = np.where(epoch.available[:, None], variance, 0.0)
-        self._residual.push(residual)
-        self._variance.push(variance)
-        total = np.abs(np.add.reduce(self._residual.values, axis=1))
-        spread = np.sqrt(np.add.reduce(self._variance.values, axis=1))
-        ratio = np.divide(total, spread, out=np.zeros_like(total), where=spread > 0.0)
-        return np.asarray(np.maximum.reduce(ratio, axis=1))
+            newest[~epoch.available] = 0.0
+        sums = self._sum.push(newest)
+        # without a fix the sums are rounding errors: only the number of fixes is exact
+        fixes = sums[:, -1:] > 0.0
+        deviation = np.sqrt(np.where(fixes, sums[:, m:-1], np.inf))
+        return np.asarray(reduce(np.maximum, (np.abs(sums[:, :m]) / deviation).T))

@@ -8,6 +8,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.ring import Ring
+from spoofgym.navigation.facts import INERTIAL_SOLUTION
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.specification import spell
 
@@ -75,6 +76,7 @@ class RelativeMotion(Detector):
     PRESETS = ("foi",)
     KIND = "relative-motion"
     demands = Demands(auxiliary=True)
+    needs = (INERTIAL_SOLUTION,)
     needs_view = True
 
     def __init__(

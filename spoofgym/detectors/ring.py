@@ -1,4 +1,4 @@
-"""The last n values of each run."""
+"""The last n values of each run, and their sum."""
 
 from __future__ import annotations
 
@@ -47,3 +47,35 @@ class Ring:
         """Copy what a ring of fewer runs holds: its run j becomes run ``runs[j]`` here."""
         self.values[runs] = other.values
         self._place[runs] = self._start[runs] + other._place - other._start
+
+
+class MovingSum:
+    """The sum of the last n values of N runs, each a number or a vector of ``width``; of fewer where fewer have come.
+
+    The newest value is added and the oldest taken away, whatever n: rounding errors stay in ``total`` until the reset
+    of the run. They are of the size of 1e-16 times the largest value since then; a test that must be exact adds up a
+    `Ring` anew.
+
+    Attributes:
+        total: (N,) or (N, width).
+    """
+
+    def __init__(self, num_runs: int, length: int, width: int | None = None) -> None:
+        self._ring = Ring(num_runs, length, width)
+        self.total: Floats = np.zeros(num_runs if width is None else (num_runs, width))
+
+    def reset(self, runs: Runs) -> None:
+        """Forget the values of these runs."""
+        self._ring.reset(runs)
+        self.total[runs] = 0.0
+
+    def push(self, value: Floats) -> Floats:
+        """Add each run's value, (N,) or (N, width), in place of its oldest one; the sums."""
+        self.total += value - self._ring.oldest
+        self._ring.push(value)
+        return self.total
+
+    def take(self, runs: Runs, other: MovingSum) -> None:
+        """Copy what a sum of fewer runs holds: its run j becomes run ``runs[j]`` here."""
+        self._ring.take(runs, other._ring)
+        self.total[runs] = other.total

@@ -6,19 +6,17 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
-from spoofgym.detectors.base import Detector
+from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.chi_square import quantile
-from spoofgym.detectors.ring import Ring
+from spoofgym.detectors.ring import MovingSum
 from spoofgym.navigation.interface import Epoch
-from spoofgym.specification import spell
 
 DEFAULT_WINDOW = 5
-DEFAULT_ARL0 = 1e3
 HORIZONTAL = 2
 """Degrees of freedom: east and north."""
 
 
-class SignedMean(Detector):
+class SignedMean(ThresholdDetector):
     """Alarm where the last n whitened horizontal innovations lean to one side: statistic |Σ w|² / n = n |mean w|².
 
     The whitening factor L is lower triangular, so the first two components of w = L⁻¹ z are the east and north
@@ -43,6 +41,9 @@ class SignedMean(Detector):
         ValueError: more than one of the last three is given, or a value is out of range.
     """
 
+    kind = "signed-mean"
+    default_arl0 = 1e3
+
     def __init__(
         self,
         n: int = DEFAULT_WINDOW,
@@ -50,38 +51,23 @@ class SignedMean(Detector):
         p_fa: float | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole("signed-mean", "n", n, 1)
+        self.n = validation.whole(self.kind, "n", n, 1)
         self.memory = self.n - 1
-        validation.at_most_one("signed-mean", threshold=threshold, p_fa=p_fa, arl0=arl0)
-        if threshold is not None:
-            self.threshold = validation.above("signed-mean", "threshold", threshold)
-        elif p_fa is not None:
-            self.threshold = quantile(validation.probability("signed-mean", "p_fa", p_fa), HORIZONTAL)
-        else:
-            self.target_arl0 = validation.above("signed-mean", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
-        self._name = spell(
-            "signed-mean",
-            n=None if self.n == DEFAULT_WINDOW else self.n,
-            threshold=None if threshold is None else self.threshold,
-            p_fa=p_fa,
-            arl0=None if self.target_arl0 == DEFAULT_ARL0 else self.target_arl0,
-        )
-
-    @property
-    def name(self) -> str:
-        """The specification that builds this detector."""
-        return self._name
+        validation.at_most_one(self.kind, threshold=threshold, p_fa=p_fa, arl0=arl0)
+        self.set_up(threshold, arl0, n=self.n, p_fa=p_fa)
+        if p_fa is not None:
+            self.threshold = quantile(validation.probability(self.kind, "p_fa", p_fa), HORIZONTAL)
+            self.target_arl0 = None
 
     def bind(self, num_runs: int, dimension: int) -> None:
         """Allocate the window."""
-        self._ring = Ring(num_runs, self.n, HORIZONTAL)
+        self._sum = MovingSum(num_runs, self.n, HORIZONTAL)
 
     def reset(self, runs: Runs) -> None:
         """Empty the windows of these runs."""
-        self._ring.reset(runs)
+        self._sum.reset(runs)
 
     def update(self, epoch: Epoch) -> Floats:
-        """|Σ w|² / n, (N,), added up anew at every epoch so that no rounding error accumulates."""
-        self._ring.push(epoch.innovation.whitened[:, :HORIZONTAL])
-        total = np.add.reduce(self._ring.values, axis=1)
+        """|Σ w|² / n, (N,)."""
+        total = self._sum.push(epoch.innovation.whitened[:, :HORIZONTAL])
         return np.asarray((total[:, 0] ** 2 + total[:, 1] ** 2) / self.n)

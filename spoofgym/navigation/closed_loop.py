@@ -38,6 +38,7 @@ def propagate(
     boundaries: Runs,
     latency_samples: int,
     filter_density: Floats,
+    process_scale: Floats,
     true_noise: Floats,
     instability_sigma: Floats,
     instability_decay: float,
@@ -90,7 +91,7 @@ def propagate(
         navigation_dynamics(middle_velocity, middle_position, mean_force, dynamics)
         transition_matrix(dynamics, middle_attitude, interval, transition, work)
         for i in range(NUM_STATES):
-            half_noise[i, i] = 0.5 * interval * filter_density[i]
+            half_noise[i, i] = 0.5 * interval * filter_density[i] * process_scale[run]
             covariance[run, i, i] += half_noise[i, i]
         kalman.predict_covariance(transition, half_noise, covariance[run], product)
         if auxiliary.shape[1] > 0:
@@ -148,6 +149,7 @@ def innovate(
     lever_arm: Floats,
     latency: float,
     measurement_covariance: Floats,
+    noise_row: Runs,
     noise_scale: Floats,
     deviation: Floats,
     innovation: Floats,
@@ -156,7 +158,7 @@ def innovate(
     whitened: Floats,
     nis: Floats,
 ) -> None:
-    """Innovation of runs with their own S, and the whitened gain.
+    """Innovation of runs with their own S, and the whitened gain; a run's R is a row of the measurement covariances.
 
     Outputs, except the gain, stand at the places of the runs.
     """
@@ -183,10 +185,9 @@ def innovate(
             residual[place, a] = difference[a] + arm[a] - deviation[run, a]
         for a in range(3, m):
             residual[place, a] = fix[run, VELOCITY, a - 3] - fix_velocity[k, a - 3] - deviation[run, a]
-        kalman.innovation_covariance(
-            covariance[run], observation, measurement_covariance[k], cross, innovation[place]
-        )
-        kalman.scale_noise(noise_scale[place], measurement_covariance[k], innovation[place])
+        noise = measurement_covariance[noise_row[run]]
+        kalman.innovation_covariance(covariance[run], observation, noise, cross, innovation[place])
+        kalman.scale_noise(noise_scale[place], noise, innovation[place])
         kalman.cholesky(innovation[place], factor)
         kalman.whitened_gain(cross, factor, gain[run])
         nis[place] = kalman.whiten(factor, residual[place], whitened[place])
@@ -246,7 +247,7 @@ def resolve(
 def reset(
     runs: Runs,
     variance: Floats,
-    index: Runs,
+    noise_row: Runs,
     velocity: Floats,
     position: Floats,
     covariance: Floats,
@@ -258,7 +259,7 @@ def reset(
         run = runs[place]
         for a in range(residual.shape[1] - 3):
             velocity[run, a] -= residual[place, 3 + a]
-            kalman.forget_correlations(3 + a, measurement_covariance[index[run], 3 + a, 3 + a], covariance[run])
+            kalman.forget_correlations(3 + a, measurement_covariance[noise_row[run], 3 + a, 3 + a], covariance[run])
         latitude, longitude, height = enu_displacement(
             position[run, 0],
             position[run, 1],

@@ -76,6 +76,9 @@ class StrapdownNavigator:
         self._slices = slices
         self._all = np.arange(num_runs)
         self._ones = np.ones(num_runs)
+        self._measurement_covariance = model.measurement_covariance
+        self._noise_row = self.index
+        self._process_scale = np.ones(num_runs)
         # what a resolved epoch leaves, in the order of the rings
         self._resolved = (
             self.attitude,
@@ -152,6 +155,7 @@ class StrapdownNavigator:
             model.boundaries,
             model.latency_samples,
             model.filter_density,
+            self._process_scale,
             model.true_noise,
             model.instability_sigma,
             model.instability_decay,
@@ -185,7 +189,8 @@ class StrapdownNavigator:
                 model.fix_velocity,
                 model.lever_arm,
                 float(model.latency_samples * model.step[0]),
-                model.measurement_covariance,
+                self._measurement_covariance,
+                self._noise_row,
                 noise_scale,
                 self._deviation,
                 innovation,
@@ -219,6 +224,12 @@ class StrapdownNavigator:
             jumps = used & (decision.reset > 0.0)
             self._reset_to_fix(runs[jumps], decision.reset[jumps])
             used = used & ~jumps
+        self._correct(runs[used])
+        if before is not None:
+            self.auxiliary[runs] += _difference(before, self._solution(runs))
+
+    def _correct(self, runs: Runs) -> None:
+        """Apply the present fix."""
         self._slices.call(
             lambda part: closed_loop.resolve(
                 part,
@@ -230,11 +241,9 @@ class StrapdownNavigator:
                 self._gain,
                 self._whitened,
             ),
-            runs[used],
+            runs,
             GRAIN,
         )
-        if before is not None:
-            self.auxiliary[runs] += _difference(before, self._solution(runs))
 
     def _take_back(self, decision: Decision, runs: Runs) -> Flags:
         """Backtrack where it is decided; whether the innovation must be formed anew, (n,)."""
@@ -270,11 +279,11 @@ class StrapdownNavigator:
             closed_loop.reset(
                 runs,
                 variance,
-                self.index,
+                self._noise_row,
                 self.velocity,
                 self.position,
                 self.covariance,
-                self.model.measurement_covariance,
+                self._measurement_covariance,
                 self._residual[runs],
             )
 

@@ -57,6 +57,8 @@ class OwnCovarianceNavigator(LinearNavigator):
         self._past_state = np.zeros((num_runs, slots, NUM_STATES))
         self._past_covariance = np.zeros((num_runs, slots, NUM_PACKED))
         self._ones = np.ones(num_runs)
+        self._measurement_covariance = np.tile(model.measurement_covariance, (num_runs, 1, 1))
+        self._process_scale = np.ones(num_runs)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0, with the filter's warm covariance."""
@@ -76,6 +78,7 @@ class OwnCovarianceNavigator(LinearNavigator):
                 model.transition_columns,
                 model.transition,
                 model.process_noise,
+                self._process_scale,
                 model.noise_columns,
                 self.normals,
                 self.bias_steps,
@@ -106,7 +109,7 @@ class OwnCovarianceNavigator(LinearNavigator):
                 self.state,
                 self.covariance,
                 model.observation,
-                model.measurement_covariance,
+                self._measurement_covariance,
                 noise_scale,
                 self._deviation,
                 covariance,
@@ -141,11 +144,13 @@ class OwnCovarianceNavigator(LinearNavigator):
                 jumps = used & (decision.reset > 0.0)
                 self._reset_to_fix(runs[jumps], decision.reset[jumps])
                 used = used & ~jumps
-            self._slices.call(
-                lambda part: _correct_own(part, self.state, self.covariance, self._gain, self._whitened),
-                runs[used],
-                GRAIN,
-            )
+            self._correct(runs[used])
+
+    def _correct(self, runs: Runs) -> None:
+        """Apply the present fix."""
+        self._slices.call(
+            lambda part: _correct_own(part, self.state, self.covariance, self._gain, self._whitened), runs, GRAIN
+        )
 
     def _take_back(self, decision: Decision, runs: Runs) -> Flags:
         """Backtrack where it is decided; whether the innovation must be formed anew, (n,)."""
@@ -158,6 +163,11 @@ class OwnCovarianceNavigator(LinearNavigator):
         depth = np.minimum(np.minimum(decision.backtrack, self.history), self.index[runs])
         self.backtracked[runs] = depth
         fresh = depth > 0
+        self._go_back(runs[fresh])
+        return fresh
+
+    def _go_back(self, runs: Runs) -> None:
+        """Restore the state before the fixes taken back, and carry it to the present epoch without them."""
         model = self.model
         self._slices.call(
             lambda part: _backtrack(
@@ -169,16 +179,16 @@ class OwnCovarianceNavigator(LinearNavigator):
                 model.transition_columns,
                 model.transition,
                 model.process_noise,
+                self._process_scale,
                 model.noise_columns,
                 self.normals,
                 self.bias_steps,
                 self._past_state,
                 self._past_covariance,
             ),
-            runs[fresh],
+            runs,
             1,
         )
-        return fresh
 
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
         """Position and, where the receiver gives it, velocity jump to the fix; their correlations are forgotten."""
@@ -190,7 +200,7 @@ class OwnCovarianceNavigator(LinearNavigator):
                 self.state,
                 self.covariance,
                 self.model.observation,
-                self.model.measurement_covariance,
+                self._measurement_covariance,
                 self._deviation,
             )
 
@@ -237,6 +247,17 @@ def _unpack(packed: Floats, covariance: Floats) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _scaled(process_noise: Floats, scale: float, work: Floats) -> Floats:
+    """Scale times Q, in work (15, 15) unless it is Q itself."""
+    if scale == 1.0:
+        return process_noise
+    for i in range(NUM_STATES):
+        for j in range(NUM_STATES):
+            work[i, j] = scale * process_noise[i, j]
+    return work
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _propagate(
     runs: Runs,
     index: Runs,
@@ -245,6 +266,7 @@ def _propagate(
     transition_columns: Floats,
     transition: Floats,
     process_noise: Floats,
+    process_scale: Floats,
     noise_columns: Floats,
     normals: Floats,
     bias_steps: Floats,
@@ -253,7 +275,7 @@ def _propagate(
 ) -> None:
     """Keep the resolved state, index <- index + 1, x <- Φ x + w, P <- Φ P Φ' + Q."""
     work, noise = np.empty(NUM_NAVIGATION), np.zeros(NUM_STATES)
-    product = np.empty((NUM_NAVIGATION, NUM_STATES))
+    product, scaled = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_STATES, NUM_STATES))
     slots = past_state.shape[1]
     for run in runs:
         index[run] += 1
@@ -263,7 +285,8 @@ def _propagate(
             _pack(covariance[run], past_covariance[run, k % slots])
         draw_process_noise(run, k, noise_columns, normals, bias_steps, noise)
         kalman.predict_error(transition_columns[k], noise, state[run], work)
-        kalman.predict_covariance(transition[k], process_noise[k], covariance[run], product)
+        noise_added = _scaled(process_noise[k], process_scale[run], scaled)
+        kalman.predict_covariance(transition[k], noise_added, covariance[run], product)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -276,6 +299,7 @@ def _backtrack(
     transition_columns: Floats,
     transition: Floats,
     process_noise: Floats,
+    process_scale: Floats,
     noise_columns: Floats,
     normals: Floats,
     bias_steps: Floats,
@@ -284,7 +308,7 @@ def _backtrack(
 ) -> None:
     """Restore the state after epoch k - n - 1 and carry it to epoch k by inertial measurements alone."""
     work, noise = np.empty(NUM_NAVIGATION), np.zeros(NUM_STATES)
-    product = np.empty((NUM_NAVIGATION, NUM_STATES))
+    product, scaled = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_STATES, NUM_STATES))
     slots = past_state.shape[1]
     for run in runs:
         first, last = index[run] - depth[run], index[run]
@@ -296,7 +320,8 @@ def _backtrack(
                 _pack(covariance[run], past_covariance[run, k % slots])
             draw_process_noise(run, k, noise_columns, normals, bias_steps, noise)
             kalman.predict_error(transition_columns[k], noise, state[run], work)
-            kalman.predict_covariance(transition[k], process_noise[k], covariance[run], product)
+            noise_added = _scaled(process_noise[k], process_scale[run], scaled)
+            kalman.predict_covariance(transition[k], noise_added, covariance[run], product)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -323,8 +348,9 @@ def _innovate_own(
         run = runs[place]
         k = index[run]
         observe(observation[k], state[run], deviation[run], residual[place])
-        kalman.innovation_covariance(covariance[run], observation[k], measurement_covariance, cross, innovation[place])
-        kalman.scale_noise(noise_scale[place], measurement_covariance, innovation[place])
+        noise = measurement_covariance[run]
+        kalman.innovation_covariance(covariance[run], observation[k], noise, cross, innovation[place])
+        kalman.scale_noise(noise_scale[place], noise, innovation[place])
         kalman.cholesky(innovation[place], factor)
         kalman.whitened_gain(cross, factor, gain[run])
         nis[place] = kalman.whiten(factor, residual[place], whitened[place])
@@ -359,7 +385,7 @@ def _reset(
             observe(observation[k], state[run], deviation[run], residual)
             for a in range(3):
                 state[run, 3 + a] -= residual[3 + a]
-                kalman.forget_correlations(3 + a, measurement_covariance[3 + a, 3 + a], covariance[run])
+                kalman.forget_correlations(3 + a, measurement_covariance[run, 3 + a, 3 + a], covariance[run])
         observe(observation[k], state[run], deviation[run], residual)
         for a in range(3):
             state[run, 6 + a] -= residual[a]

@@ -10,9 +10,9 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
+from spoofgym.detectors.gates import DEFAULT_GATE, at_least_one_sigma, joint_ratio
 from spoofgym.navigation.interface import Decision, Epoch
 from spoofgym.responses.autopilot import (
-    DEFAULT_GATE,
     HORIZONTAL,
     LEAST_VARIANCE,
     ROUNDING,
@@ -20,7 +20,6 @@ from spoofgym.responses.autopilot import (
     VELOCITY,
     Autopilot,
     fix_variance,
-    joint_ratio,
     position_variance,
 )
 from spoofgym.responses.base import given
@@ -53,7 +52,7 @@ class ArduPilot(Autopilot):
         height_gate: float = DEFAULT_GATE,
     ) -> None:
         super().__init__(position_gate, velocity_gate)
-        self.height_gate = self._gate("height_gate", height_gate)
+        self.height_gate = at_least_one_sigma(self.kind, "height_gate", height_gate)
 
     def _spell(self, **options: object) -> str:
         """The specification with the gates before a subclass's own options."""

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.navigation.interface import Epoch, Innovation
+from spoofgym.detectors.gates import DEFAULT_GATE, at_least_one_sigma
+from spoofgym.navigation.interface import Epoch
 from spoofgym.responses.base import Response
 from spoofgym.specification import spell
 
-DEFAULT_GATE = 5.0
-"""Sigma: the default of every gate in PX4 (EKF2_GPS_P_GATE, EKF2_GPS_V_GATE) and ArduPilot (EK3_..._I_GATE = 500)."""
 ROUNDING = 1e-6
 """s: times are sums of intervals, and a timer must not run out by their rounding."""
 
@@ -19,22 +17,6 @@ LEAST_VARIANCE = 1e-4
 """m²: of a position, in both (ArduPilot: POS_STATE_MIN_VARIANCE)."""
 
 HORIZONTAL, UP, VELOCITY = slice(0, 2), slice(2, 3), slice(3, 6)
-
-
-def axis_ratios(innovation: Innovation, gate: float, axes: slice) -> Floats:
-    """Each axis by itself, ν²/(gate² S), (N, axes); 1 is the edge of the gate (PX4: updateAidSourceStatus)."""
-    variance = np.diagonal(innovation.covariance, axis1=1, axis2=2)[:, axes]
-    return np.asarray(innovation.residual[:, axes] ** 2 / (gate**2 * variance))
-
-
-def joint_ratio(innovation: Innovation, gate: float, axes: slice) -> Floats:
-    """Axes together, Σν²/(gate² ΣS), (N,); 1 is the edge of the gate (ArduPilot: posTestRatio, velTestRatio)."""
-    variance = np.diagonal(innovation.covariance, axis1=1, axis2=2)[:, axes]
-    squares, variances = np.zeros(len(variance)), np.zeros(len(variance))
-    for axis in range(variance.shape[1]):
-        squares += innovation.residual[:, axes][:, axis] ** 2
-        variances += variance[:, axis]
-    return np.asarray(squares / (gate**2 * variances))
 
 
 def position_variance(epoch: Epoch) -> Floats:
@@ -80,14 +62,8 @@ class Autopilot(Response):
     kind: str
 
     def __init__(self, position_gate: float = DEFAULT_GATE, velocity_gate: float = DEFAULT_GATE) -> None:
-        self.position_gate = self._gate("position_gate", position_gate)
-        self.velocity_gate = self._gate("velocity_gate", velocity_gate)
-
-    def _gate(self, name: str, value: float) -> float:
-        gate = validation.finite(self.kind, name, value)
-        if gate < 1.0:
-            raise ValueError(f"{self.kind}: {name} must be 1 sigma or more, got {value!r}")
-        return gate
+        self.position_gate = at_least_one_sigma(self.kind, "position_gate", position_gate)
+        self.velocity_gate = at_least_one_sigma(self.kind, "velocity_gate", velocity_gate)
 
     @property
     def name(self) -> str:

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.detectors.gates import axis_ratios
 from spoofgym.navigation.interface import Decision, Epoch
-from spoofgym.responses.autopilot import HORIZONTAL, ROUNDING, VELOCITY, Autopilot, axis_ratios, fix_variance
+from spoofgym.responses.autopilot import HORIZONTAL, ROUNDING, VELOCITY, Autopilot, fix_variance
 from spoofgym.responses.base import given
 
 RESET_TIMEOUT = 7.0

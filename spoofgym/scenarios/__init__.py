@@ -9,9 +9,15 @@ from spoofgym.scenario import Scenario
 from spoofgym.scenarios.foi_drive import foi_drive
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.scenarios.recorded import recorded
+from spoofgym.scenarios.shadmehri_flight import shadmehri_flight
 from spoofgym.specification import build
 
-SCENARIOS: dict[str, Callable[..., Scenario]] = {"foi-drive": foi_drive, "liu-flight": liu_flight, "recorded": recorded}
+SCENARIOS: dict[str, Callable[..., Scenario]] = {
+    "foi-drive": foi_drive,
+    "liu-flight": liu_flight,
+    "recorded": recorded,
+    "shadmehri-flight": shadmehri_flight,
+}
 
 
 @lru_cache(maxsize=32)

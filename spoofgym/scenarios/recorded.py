@@ -16,6 +16,7 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
+from spoofgym.navigation.facts import INERTIAL_SOLUTION
 from spoofgym.navigation.interface import Decision, Demands, Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose import StrapdownNavigator
@@ -84,6 +85,7 @@ class RecordedScenario(Scenario):
     """
 
     fidelities = ("strapdown",)
+    offers = (INERTIAL_SOLUTION,)
     matched = False
     random = False
 

@@ -1,5 +1,6 @@
 """Made-up motion of a receiver, an unaided inertial solution and a filter, as epochs of the game."""
 
+import copy
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,3 +46,57 @@ class Motion:
 def motion():
     """The class of made-up motion."""
     return Motion
+
+
+class White:
+    """Epochs of which a test of the whitened innovations reads something: (K, N, m), and a covariance of unity."""
+
+    @staticmethod
+    def epoch(whitened, k=0, available=None):
+        n, m = whitened.shape
+        covariance = np.broadcast_to(np.eye(m), (n, m, m))
+        innovation = Innovation(whitened, covariance, whitened, (whitened**2).sum(axis=1))
+        return Epoch(np.full(n, k), np.full(n, float(k)), innovation, available=available)
+
+    @classmethod
+    def run(cls, detector, whitened, available=None, resets=None):
+        """Statistics, (K, N); ``resets`` says which runs are reset before which epoch, as `since` reads it."""
+        detector.bind(whitened.shape[1], whitened.shape[2])
+        rows = []
+        for k, values in enumerate(whitened):
+            if resets and k in resets:
+                detector.reset(np.array(resets[k]))
+            rows.append(detector.update(cls.epoch(values, k, None if available is None else available[k])))
+        return np.array(rows)
+
+    @staticmethod
+    def since(epochs, runs, resets):
+        """Epoch at which each run was last reset, (K, N)."""
+        rows = np.zeros((epochs, runs), dtype=int)
+        for k in range(1, epochs):
+            rows[k] = rows[k - 1]
+            rows[k, resets.get(k, [])] = k
+        return rows
+
+    @classmethod
+    def runs_are_independent(cls, make, whitened):
+        """Any slice of the runs gives the same bits, and a copy of fewer runs is taken over."""
+        whole = cls.run(make(), whitened)
+        for part in (slice(0, 1), slice(3, 10), slice(100, 164)):
+            np.testing.assert_array_equal(cls.run(make(), whitened[:, part]), whole[:, part])
+        large = make()
+        small = copy.copy(large)
+        cls.run(large, whitened[:7, :20])
+        cls.run(small, whitened[:7, 50:52])
+        large.take(np.array([4, 0]), small)
+        mixed = whitened[:, :20].copy()
+        mixed[:, [4, 0]] = whitened[:, 50:52]
+        rows = np.array([large.update(cls.epoch(values, k)) for k, values in enumerate(mixed[7:], 7)])
+        np.testing.assert_array_equal(rows[:, [4, 0]], whole[7:, 50:52])
+        np.testing.assert_array_equal(rows[:, 5:], whole[7:, 5:20])
+
+
+@pytest.fixture
+def white():
+    """The class of epochs from whitened innovations."""
+    return White

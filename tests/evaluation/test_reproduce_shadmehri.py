@@ -20,6 +20,13 @@ def test_latency_is_that_of_the_first_epoch_above_the_threshold():
     np.testing.assert_array_equal(flights.latency(3.0, 35.0), [0.4, math.inf])
 
 
+def test_a_matched_threshold_is_exceeded_in_one_of_a_hundred_clean_stretches():
+    clean = np.random.default_rng(2).chisquare(3, (500, 203))
+    flights = Flights(clean, {}, np.arange(1, 51) / 10.0)
+    stretches = clean[:, 3:].reshape(2000, 50)
+    assert np.count_nonzero((stretches > flights.matched_threshold()).any(axis=1)) == 20
+
+
 @pytest.mark.parametrize("rate", [10, 160])
 def test_the_common_filter_in_white_noise_has_three_degrees_of_freedom(rate):
     times, nis = statistic(Setup(COMMON, "white", rate), 0.0, 200, 3)
@@ -43,8 +50,7 @@ def test_self_tuning_filter_is_blind_in_white_noise_at_a_matched_rate():
     common, tuned = (fly(Setup(kind, "white", 10), RUNS, 0) for kind in (COMMON, SELF_TUNING))
     found = []
     for flights in (common, tuned):
-        threshold = float(np.quantile(flights.clean, 1.0 - shadmehri_2025.MATCHED))
-        found.append(np.isfinite(flights.latency(5.0, threshold)))
+        found.append(np.isfinite(flights.latency(5.0, flights.matched_threshold())))
     only_common, only_tuned = int(np.sum(found[0] & ~found[1])), int(np.sum(found[1] & ~found[0]))
     assert stats.binomtest(only_common, only_common + only_tuned, 0.5, alternative="greater").pvalue < 1e-3
 

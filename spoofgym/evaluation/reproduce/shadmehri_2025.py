@@ -34,7 +34,8 @@ TITLE = "Shadmehri and Mahboobi Esfanjani 2025, spoofing detection by a self-tun
 ONSET, END, WARM = 20.0, 25.0, 10.0
 WINDOW = 50
 NOMINAL = 1e-5
-MATCHED = 1e-3
+MATCHED = 0.01
+"""Share of clean stretches as long as the attack in which there is an alarm."""
 CLEAN_RUNS = 10
 """Clean runs for each spoofed one."""
 DIAGONAL = 45.0
@@ -55,6 +56,8 @@ READINGS = (
     "Latency is the median of all runs, never where fewer than half of them detect between 20 and 25 s; a ramp of r "
     "m/s runs in north and in east each.",
     "Runs are of the linear fidelity; false alarms are counted in ten times as many clean runs, from 10 s on.",
+    "At a matched rate each filter has the threshold at which 1 % of its own clean stretches of 5 s, the length of the "
+    "attack, have an alarm: a rate in time, the same for 10 and 160 Hz.",
 )
 
 
@@ -107,6 +110,12 @@ class Flights:
         """Time from the onset to the first alarm of each run, (runs,), s; infinite where there is none."""
         above = self.spoofed[rate] > threshold
         return np.where(above.any(axis=1), self.since[above.argmax(axis=1)], math.inf)
+
+    def matched_threshold(self) -> float:
+        """The threshold that the statistic exceeds in a share of `MATCHED` of clean stretches as long as the attack."""
+        length = len(self.since)
+        stretches = self.clean[:, self.clean.shape[1] % length :].reshape(-1, length)
+        return float(np.quantile(stretches.max(axis=1), 1.0 - MATCHED))
 
 
 def reproduce(runs: int, seed: int, quick: bool) -> Reproduction:
@@ -185,16 +194,16 @@ def false_alarms(flights: dict[Setup, Flights]) -> Listing:
 
 
 def matched(flights: dict[Setup, Flights], noise: str) -> Listing:
-    """Both filters at the threshold that each exceeds in 1e-3 of its own clean epochs."""
+    """Both filters at the threshold at which 1 % of their own clean stretches of 5 s have an alarm."""
     rows = []
     for rate in (10, 160):
         common, tuned = (flights[Setup(kind, noise, rate)] for kind in (COMMON, SELF_TUNING))
-        thresholds = [float(np.quantile(flight.clean, 1.0 - MATCHED)) for flight in (common, tuned)]
+        thresholds = [flight.matched_threshold() for flight in (common, tuned)]
         for ramp in TABLE_1[COMMON]:
             latencies = common.latency(ramp, thresholds[0]), tuned.latency(ramp, thresholds[1])
             rows.append(_matched_row(rate, ramp, *latencies, thresholds))
     words = "white noise" if noise == "white" else "correlated noise"
-    return Listing(f"Matched at {MATCHED:g} false alarms per epoch: {words}", tuple(rows))
+    return Listing(f"Matched, {MATCHED:.0%} of clean stretches of 5 s alarm: {words}", tuple(rows))
 
 
 def _matched_row(rate: int, ramp: float, common: Floats, tuned: Floats, thresholds: list[float]) -> Row:

@@ -1,0 +1,241 @@
+"""Navigators that tune themselves, in both fidelities: the same filters with R and a factor on Q of each run's own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.adaptation import Adaptation, adapt, negative_ratio
+from spoofgym.navigation.interface import Decision, Demands, Innovation
+from spoofgym.navigation.linear import NO_DEMANDS
+from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose import StrapdownNavigator
+from spoofgym.navigation.own_covariance import GRAIN, OwnCovarianceNavigator
+from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.parallel import RunSlices
+from spoofgym.sensors.imu import ImuGrade
+from spoofgym.streams import RunStreams
+
+
+class SelfTuning:
+    """What N filters have learnt of their noises.
+
+    Attributes:
+        adaptation: how they tune themselves.
+        noise: R of each run, (N, m, m), m² and m²/s².
+        scale: factor on Q₀ of each run, (N,).
+        ratio: α of the last fix used, (N,); 1 where nothing was adapted.
+        count: fixes that have entered the windows, (N,).
+    """
+
+    def __init__(self, adaptation: Adaptation, initial: Floats, num_runs: int, history: int, slices: RunSlices) -> None:
+        """Allocate ``num_runs`` runs, which begin with R = ``initial`` (m, m); a history takes windows back, too."""
+        m, slots = len(initial), history + 1 if history else 0
+        length = adaptation.window + adaptation.delay + history
+        self.adaptation = adaptation
+        self.noise = np.tile(initial, (num_runs, 1, 1))
+        self.scale = np.ones(num_runs)
+        self.ratio = np.ones(num_runs)
+        self.count = np.zeros(num_runs, dtype=np.int64)
+        self._initial = np.array(initial)
+        self._residuals = np.zeros((num_runs, length, m))
+        self._innovations = np.zeros((num_runs, length, m))
+        self._covariance = np.zeros((num_runs, m, m))
+        self._gamma = np.zeros((num_runs, m))
+        self._nis = np.zeros(num_runs)
+        self._weight = np.ones(num_runs)
+        self._slices = slices
+        self._slots = slots
+        self._adapted = (self.noise, self.scale, self.count)
+        self._past = tuple(np.zeros((num_runs, slots, *part.shape[1:]), part.dtype) for part in self._adapted)
+
+    def reset(self, runs: Runs) -> None:
+        """Forget what runs have learnt."""
+        self.noise[runs] = self._initial
+        self.scale[runs] = 1.0
+        self.ratio[runs] = 1.0
+        self.count[runs] = 0
+
+    def note(self, runs: Runs, innovation: Innovation, weight: Floats) -> None:
+        """Keep the innovation of runs, formed with R times ``weight`` (n,), until its fix is used."""
+        self._covariance[runs] = innovation.covariance
+        self._gamma[runs] = innovation.residual
+        self._nis[runs] = innovation.nis
+        self._weight[runs] = weight
+
+    def adapt(self, runs: Runs, index: Runs, time: Floats) -> None:
+        """Renew R and the factor on Q of runs that have used a fix.
+
+        Args:
+            runs: which, (n,).
+            index: epochs of all runs, (N,), and their times (E,), s, for the message.
+            time: of the epochs, (E,), s.
+
+        Raises:
+            NegativeRatioError: an unguarded run has met α < 0.
+        """
+        self._slices.call(self._adapt_slice, runs, GRAIN)
+        if self.adaptation.literal:
+            failed = runs[~(self.ratio[runs] >= 0.0)]
+            if len(failed):
+                run = int(failed[0])
+                raise negative_ratio(run, int(index[run]), float(time[index[run]]), float(self.ratio[run]))
+
+    def _adapt_slice(self, runs: Runs) -> None:
+        adaptation = self.adaptation
+        adapt(
+            runs,
+            self._covariance,
+            self._gamma,
+            self._nis,
+            self._weight,
+            adaptation.window,
+            adaptation.delay,
+            adaptation.frozen_above,
+            not adaptation.has("non-cumulative"),
+            adaptation.ratio_range,
+            adaptation.scale_range,
+            adaptation.noise_range,
+            self._initial,
+            self._residuals,
+            self._innovations,
+            self.count,
+            self.ratio,
+            self.noise,
+            self.scale,
+        )
+
+    def keep(self, runs: Runs, index: Runs) -> None:
+        """Write what runs know after their epochs ``index`` (n,) into the history."""
+        if self._slots:
+            for ring, part in zip(self._past, self._adapted, strict=True):
+                ring[runs, (index + 1) % self._slots] = part[runs]
+
+    def take_back(self, runs: Runs, index: Runs, depth: Runs) -> None:
+        """Forget the fixes of the last epochs before the present ones.
+
+        Args:
+            runs: which, (n,).
+            index: their present epochs, (n,).
+            depth: fixes taken back, (n,).
+        """
+        first = index - depth
+        for ring, part in zip(self._past, self._adapted, strict=True):
+            part[runs] = ring[runs, first % self._slots]
+        for back in range(int(depth.max(initial=0))):
+            left = depth > back
+            self.keep(runs[left], index[left] - back - 1)
+
+
+class AdaptiveNavigator(OwnCovarianceNavigator):
+    """N self-tuning filters in the linear fidelity.
+
+    The innovation has the R matched to the fixes before it, R_{k-1}: with R_k, as the paper's (14) reads, S would hold
+    the residual of the fix under test. A fix that is left out, or reset to, does not enter the windows.
+
+    Attributes:
+        tuned: what the filters have learnt of their noises.
+    """
+
+    def __init__(
+        self,
+        model: LinearModel,
+        grade: ImuGrade,
+        interval: float,
+        num_runs: int,
+        slices: RunSlices,
+        adaptation: Adaptation,
+        demands: Demands = NO_DEMANDS,
+    ) -> None:
+        """As for `LinearNavigator`; ``model`` is of the filter that all runs begin with."""
+        super().__init__(model, grade, interval, num_runs, slices, demands)
+        self.tuned = SelfTuning(adaptation, model.measurement_covariance, num_runs, demands.history, slices)
+        self._measurement_covariance = self.tuned.noise
+        self._process_scale = self.tuned.scale
+
+    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
+        """Start new episodes just before epoch 0 with the initial R and Q and empty windows."""
+        super().reset(runs, initial, streams)
+        self.tuned.reset(runs)
+
+    def propagate(self, runs: Runs | None = None) -> None:
+        """Carry runs (all by default) to their next epoch."""
+        runs = self._all if runs is None else runs
+        self.tuned.keep(runs, self.index[runs])
+        super().propagate(runs)
+
+    def _innovate(self, runs: Runs, noise_scale: Floats) -> Innovation:
+        innovation = super()._innovate(runs, noise_scale)
+        self.tuned.note(runs, innovation, noise_scale)
+        return innovation
+
+    def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
+        """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
+
+        Raises:
+            ValueError: a backtrack without a history.
+            NegativeRatioError: an unguarded run has met α < 0.
+        """
+        super().resolve(decision, runs)
+
+    def _correct(self, runs: Runs) -> None:
+        super()._correct(runs)
+        self.tuned.adapt(runs, self.index, self.model.time)
+
+    def _go_back(self, runs: Runs) -> None:
+        self.tuned.take_back(runs, self.index[runs], self.backtracked[runs])
+        super()._go_back(runs)
+
+
+class AdaptiveStrapdownNavigator(StrapdownNavigator):
+    """N self-tuning filters in the strapdown fidelity; otherwise as `AdaptiveNavigator`.
+
+    Attributes:
+        tuned: what the filters have learnt of their noises.
+    """
+
+    def __init__(
+        self,
+        model: StrapdownModel,
+        num_runs: int,
+        slices: RunSlices,
+        adaptation: Adaptation,
+        demands: Demands = NO_DEMANDS,
+    ) -> None:
+        """As for `StrapdownNavigator`; the filter begins with the R of the model's first epoch."""
+        super().__init__(model, num_runs, slices, demands)
+        self.tuned = SelfTuning(adaptation, model.measurement_covariance[0], num_runs, demands.history, slices)
+        self._measurement_covariance = self.tuned.noise
+        self._noise_row = self._all
+        self._process_scale = self.tuned.scale
+
+    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
+        """Start new episodes just before epoch 0 with the initial R and Q and empty windows."""
+        super().reset(runs, initial, streams)
+        self.tuned.reset(runs)
+
+    def _keep(self, runs: Runs) -> None:
+        super()._keep(runs)
+        self.tuned.keep(runs, self.index[runs])
+
+    def _innovate(self, runs: Runs, noise_scale: Floats) -> Innovation:
+        innovation = super()._innovate(runs, noise_scale)
+        self.tuned.note(runs, innovation, noise_scale)
+        return innovation
+
+    def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
+        """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
+
+        Raises:
+            ValueError: a backtrack without a history.
+            NegativeRatioError: an unguarded run has met α < 0.
+        """
+        super().resolve(decision, runs)
+
+    def _correct(self, runs: Runs) -> None:
+        super()._correct(runs)
+        self.tuned.adapt(runs, self.index, self.model.time)
+
+    def _backtrack_slice(self, runs: Runs) -> None:
+        self.tuned.take_back(runs, self.index[runs], self.backtracked[runs])
+        super()._backtrack_slice(runs)

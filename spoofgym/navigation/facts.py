@@ -1,0 +1,44 @@
+"""What is known of a filter before any epoch: to a monitor that watches it, to a spoofer who has a copy of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from spoofgym.arrays import Floats
+from spoofgym.navigation.linear_model import LinearModel
+
+INERTIAL_SOLUTION = "inertial solution"
+LINEAR_MODEL = "linear model"
+
+
+@dataclass(frozen=True)
+class FilterFacts:
+    """The filter of a scenario, as its designer knows it.
+
+    Attributes:
+        scenario: its name, for messages.
+        interval: between epochs, s.
+        bias_sigma: data-sheet biases of gyros and accelerometers, (6,), rad/s and m/s².
+        offers: what a monitor can ask for beside innovations.
+        model: burn-in -> the linear model of epochs -burn_in..K, every fix used.
+    """
+
+    scenario: str
+    interval: float
+    bias_sigma: Floats
+    offers: tuple[str, ...]
+    model: Callable[[int], LinearModel]
+
+    def require(self, owner: str, needs: tuple[str, ...]) -> None:
+        """Refuse a part that needs something the scenario does not offer.
+
+        Raises:
+            ValueError: naming the part, what it needs, and what there is.
+        """
+        missing = [need for need in needs if need not in self.offers]
+        if missing:
+            raise ValueError(
+                f"{owner} needs {' and '.join(missing)}, which scenario {self.scenario!r} does not give; it gives: "
+                f"{', '.join(self.offers)}"
+            )
