@@ -8,7 +8,8 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.ring import Ring
-from spoofgym.navigation.interface import Epoch
+from spoofgym.navigation.facts import ODOMETER, FilterFacts
+from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.specification import spell
 
 SONG_JUMP_EPOCHS = 2
@@ -16,6 +17,9 @@ SONG_SLOW_EPOCHS = 5
 SONG_JUMP_THRESHOLD = 1.5
 SONG_SLOW_THRESHOLD = 1.28
 DEFAULT_ARL0 = 1e5
+POSITIONS = ("innovation", "auxiliary")
+LIMIT = 3.0
+"""Largest threshold over the receiver's sigma (Song 2021, eqs 18 and 20)."""
 
 
 def horizontal_drift(residual: Floats) -> Floats:
@@ -29,17 +33,36 @@ def horizontal_drift(residual: Floats) -> Floats:
     return np.hypot(residual[:, 0], residual[:, 1])
 
 
+def gnss_drift(epoch: Epoch, position: str) -> Floats:
+    """Drift of the fix, (N,), m, against the filter's prediction (``innovation``) or the auxiliary position.
+
+    The innovation is p_filter - p_GNSS, the view's auxiliary_offset p_auxiliary - p_filter.
+
+    Raises:
+        RuntimeError: an auxiliary position is asked for, and the epoch was made without a navigator.
+    """
+    if position == "innovation":
+        return horizontal_drift(epoch.innovation.residual)
+    if epoch.view is None:
+        raise RuntimeError("the auxiliary position is known to a navigator only: this epoch has none")
+    return horizontal_drift(epoch.innovation.residual[:, :3] + epoch.view.auxiliary_offset)
+
+
 class Acna(Detector):
     """Alarm after consecutive large drifts, or when their mean is large (Song 2021, eqs 11, 26, 27).
 
-    The auxiliary position is the INS propagated without GNSS from the last accepted fix. In a closed-loop loosely
-    coupled filter that is the INS itself, so the drift is the horizontal norm of the innovation.
+    With ``position=innovation`` the auxiliary position is the INS propagated without GNSS from the last accepted fix.
+    In a closed-loop loosely coupled filter that is the INS itself, so the drift is the horizontal norm of the
+    innovation. With ``position=auxiliary`` it is the paper's own, dead reckoned by an odometer and the yaw of an INS,
+    which the scenario must offer.
 
     Jump (eq 26): flag_j counts consecutive drifts above Th_j and alarms at n_j, i.e. when the least of the last n_j
     drifts exceeds Th_j. Slow change (eq 27): the mean of the last n_s drifts reaches Th_s. The statistic is the larger
     of both over its threshold, so Song's rule is ``threshold`` = 1; calibration scales both tests by one factor, which
-    is then the threshold. Drifts that have not come yet count as zero. The interruption of GNSS, an alarm of its own in
-    the paper (step 3), is none here: there is no fix to test.
+    is then the threshold. Drifts that have not come yet count as zero.
+
+    An interruption of GNSS (step 3) is told by `Epoch.available`, and no navigator uses a fix that is not there. It is
+    no alarm of spoofing: the statistic is 0 then, and both windows stay as they are, neither counting nor forgetting.
 
     With nothing given the thresholds keep Song's ratio 1.5 : 1.28 and are scaled to an ARL0 of 1e5. A drift is in
     metres and its spread depends on the filter, so ``threshold`` is None until calibration sets it in the scenario.
@@ -48,10 +71,12 @@ class Acna(Detector):
         jump_epochs: n_j, consecutive epochs of the jump test; more than 1 (eq 15).
         jump_threshold: Th_j, m; together with ``slow_threshold``.
         slow_epochs: n_s, epochs of the mean; more than n_j (eq 16).
-        slow_threshold: Th_s, m. Eqs 17-21 want both between one and three sigma of the receiver, which is not known
-            here.
+        slow_threshold: Th_s, m.
         preset: ``song`` for the published Th_j = 1.5 m and Th_s = 1.28 m.
         arl0: average run length between false alarms, epochs.
+        position: from which the drift is taken, ``innovation`` or ``auxiliary``. With the latter, thresholds that are
+            given (or preset) must lie between one and three sigma of the receiver (eqs 17-20), and Th_s above what
+            dead reckoning goes wrong in an epoch (eq 21 with eq 23: all errors of the window alike).
 
     Raises:
         ValueError: thresholds, preset and arl0 exclude each other; one threshold without the other; a value out of
@@ -68,6 +93,7 @@ class Acna(Detector):
         slow_threshold: float | None = None,
         preset: str | None = None,
         arl0: float | None = None,
+        position: str = "innovation",
     ) -> None:
         self.jump_epochs = validation.whole("acna", "jump_epochs", jump_epochs, 2)
         self.slow_epochs = validation.whole("acna", "slow_epochs", slow_epochs, self.jump_epochs + 1)
@@ -79,6 +105,9 @@ class Acna(Detector):
             raise ValueError(f"acna: {alone}_threshold needs {other}_threshold beside it")
         if preset is not None:
             validation.one_of("acna", "preset", preset, self.PRESETS)
+        self.position = validation.one_of("acna", "position", position, POSITIONS)
+        if position == "auxiliary":
+            self.needs, self.demands, self.needs_view = (ODOMETER,), Demands(auxiliary=True), True
         given = jump_threshold is not None
         self.jump_threshold = validation.above(
             "acna", "jump_threshold", jump_threshold if given else SONG_JUMP_THRESHOLD
@@ -98,6 +127,7 @@ class Acna(Detector):
             slow_threshold=self.slow_threshold if given else None,
             preset=preset,
             arl0=None if self.target_arl0 == DEFAULT_ARL0 else self.target_arl0,
+            position=None if position == "innovation" else position,
         )
 
     @property
@@ -110,6 +140,28 @@ class Acna(Detector):
         self._jump = Ring(num_runs, self.jump_epochs)
         self._slow = Ring(num_runs, self.slow_epochs)
 
+    def know(self, facts: FilterFacts) -> None:
+        """Check given thresholds against the errors of receiver and dead reckoning (Song 2021, eqs 17-21).
+
+        Raises:
+            ValueError: one lies outside.
+        """
+        if self.position == "innovation" or self.target_arl0 is not None or facts.fix_sigma is None:
+            return
+        least, most = facts.fix_sigma, LIMIT * facts.fix_sigma
+        for name, threshold in (("Th_j", self.jump_threshold), ("Th_s", self.slow_threshold)):
+            if not least <= threshold <= most:
+                raise ValueError(
+                    f"detector {self.name!r}: {name} = {threshold:g} m must lie between one and three sigma of the "
+                    f"receiver of {facts.scenario!r}, from {least:g} to {most:g} m (Song 2021, eqs 17-20); an arl0 has "
+                    "no such bounds"
+                )
+        if facts.auxiliary_sigma is not None and self.slow_threshold < facts.auxiliary_sigma:
+            raise ValueError(
+                f"detector {self.name!r}: Th_s = {self.slow_threshold:g} m must be at least what dead reckoning in "
+                f"{facts.scenario!r} goes wrong in an epoch, {facts.auxiliary_sigma:.3g} m (Song 2021, eq 21)"
+            )
+
     def reset(self, runs: Runs) -> None:
         """Forget the drifts of these runs."""
         self._jump.reset(runs)
@@ -117,9 +169,11 @@ class Acna(Detector):
 
     def update(self, epoch: Epoch) -> Floats:
         """The larger of both tests over its threshold, (N,)."""
-        drift = horizontal_drift(epoch.innovation.residual)
-        self._jump.push(drift)
-        self._slow.push(drift)
+        drift = gnss_drift(epoch, self.position)
+        given = np.ones(len(drift), dtype=bool) if epoch.available is None else epoch.available
+        self._jump.push_where(given, drift)
+        self._slow.push_where(given, drift)
         jump = np.minimum.reduce(self._jump.values, axis=1)
         total = np.add.reduce(self._slow.values, axis=1)
-        return np.maximum(jump / self.jump_threshold, total / (self.slow_epochs * self.slow_threshold))
+        statistic = np.maximum(jump / self.jump_threshold, total / (self.slow_epochs * self.slow_threshold))
+        return np.where(given, statistic, 0.0)

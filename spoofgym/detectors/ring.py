@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 
 
 class Ring:
@@ -42,6 +42,12 @@ class Ring:
         """Write each run's value, (N,) or (N, width), over its oldest one."""
         self._flat[self._place] = value
         self._place = self._next.take(self._place)
+
+    def push_where(self, given: Flags, value: Floats) -> None:
+        """As `push`, in the runs that ``given`` (N,) marks; the others keep what they hold."""
+        places = self._place[given]
+        self._flat[places] = value[given]
+        self._place[given] = self._next.take(places)
 
     def take(self, runs: Runs, other: Ring) -> None:
         """Copy what a ring of fewer runs holds: its run j becomes run ``runs[j]`` here."""

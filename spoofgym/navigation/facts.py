@@ -10,6 +10,7 @@ from spoofgym.navigation.linear_model import LinearModel
 
 INERTIAL_SOLUTION = "inertial solution"
 LINEAR_MODEL = "linear model"
+ODOMETER = "odometer"
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,9 @@ class FilterFacts:
         bias_sigma: data-sheet biases of gyros and accelerometers, (6,), rad/s and m/s².
         offers: what a monitor can ask for beside innovations.
         model: burn-in -> the linear model of epochs -burn_in..K, every fix used.
+        fix_sigma: 1 sigma of a fix per horizontal axis, m; None = not told.
+        auxiliary_sigma: 1 sigma of what the odometer's solution goes wrong in an epoch at the end of the game, m; None
+            = there is no odometer.
     """
 
     scenario: str
@@ -29,6 +33,8 @@ class FilterFacts:
     bias_sigma: Floats
     offers: tuple[str, ...]
     model: Callable[[int], LinearModel]
+    fix_sigma: float | None = None
+    auxiliary_sigma: float | None = None
 
     def require(self, owner: str, needs: tuple[str, ...]) -> None:
         """Refuse a part that needs something the scenario does not offer.

@@ -10,6 +10,7 @@ from spoofgym.scenarios.foi_drive import foi_drive
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.shadmehri_flight import shadmehri_flight
+from spoofgym.scenarios.song_robot import song_robot
 from spoofgym.specification import build
 
 SCENARIOS: dict[str, Callable[..., Scenario]] = {
@@ -17,6 +18,7 @@ SCENARIOS: dict[str, Callable[..., Scenario]] = {
     "liu-flight": liu_flight,
     "recorded": recorded,
     "shadmehri-flight": shadmehri_flight,
+    "song-robot": song_robot,
 }
 
 

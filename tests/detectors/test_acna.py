@@ -5,6 +5,7 @@ import pytest
 
 from spoofgym.detectors import Acna, make_detector
 from spoofgym.detectors.acna import horizontal_drift
+from spoofgym.navigation.facts import ODOMETER, FilterFacts
 from spoofgym.navigation.interface import Epoch, Innovation
 
 
@@ -144,6 +145,7 @@ def test_one_factor_scales_both_thresholds():
         "acna:arl0=10000",
         "acna:jump_epochs=3,slow_epochs=7",
         "acna:jump_threshold=2,slow_threshold=1.5",
+        "acna:preset=song,position=auxiliary",
     ],
 )
 def test_the_name_builds_the_same_detector(specification):
@@ -165,9 +167,87 @@ def test_the_name_builds_the_same_detector(specification):
         ("acna:preset=song,arl0=100", "got preset and arl0"),
         ("acna:jump_threshold=1,slow_threshold=1,preset=song", "got jump_threshold and preset"),
         ("acna:arl0=1", "arl0 must be a finite number greater than 1, got 1.0"),
+        ("acna:position=odometer", "position must be one of innovation, auxiliary, got 'odometer'"),
         ("acna:window=3", "no option 'window'; valid options: jump_epochs"),
     ],
 )
 def test_bad_specifications_are_refused(specification, message):
     with pytest.raises(ValueError, match=message):
         make_detector(specification)
+
+
+class View:
+    """What a navigator with an odometer would tell."""
+
+    def __init__(self, auxiliary_offset):
+        self.auxiliary_offset = auxiliary_offset
+
+
+def test_the_auxiliary_drift_is_that_of_fix_and_dead_reckoning():
+    """Whatever the filter believes."""
+    rng = np.random.default_rng(0)
+    fix, dead_reckoned = rng.normal(0.0, 3.0, (2, 6, 50, 3))
+    statistics = []
+    for spread in (1.0, 100.0):
+        detector = Acna(preset="song", position="auxiliary")
+        detector.bind(50, 3)
+        believed = rng.normal(0.0, spread, (6, 50, 3))
+        for k in range(6):
+            innovation = Innovation(believed[k] - fix[k], None, None, None)
+            epoch = Epoch(None, None, innovation, view=View(dead_reckoned[k] - believed[k]))
+            statistics.append(detector.update(epoch))
+    drift = np.hypot(*(fix - dead_reckoned)[..., :2].transpose(2, 0, 1))
+    slow = drift[1:].mean(axis=0) / 1.28
+    expected = np.maximum(drift[4:].min(axis=0) / 1.5, slow)
+    np.testing.assert_allclose(statistics[5], expected, rtol=1e-9)
+    np.testing.assert_allclose(statistics[11], expected, rtol=1e-9)
+
+
+def test_the_auxiliary_position_needs_a_navigator():
+    detector = Acna(preset="song", position="auxiliary")
+    assert (detector.needs, detector.needs_view, detector.demands.auxiliary) == ((ODOMETER,), True, True)
+    assert (Acna().needs, Acna().needs_view) == ((), False)
+    detector.bind(1, 3)
+    with pytest.raises(RuntimeError, match="known to a navigator only"):
+        detector.update(epoch_of([1.0]))
+
+
+def test_an_interruption_neither_counts_nor_forgets():
+    """Step 3: back to step 3. Two drifts of 2 m with an outage between them are a jump."""
+    detector = Acna(preset="song")
+    detector.bind(2, 3)
+    detector.update(epoch_of([2.0, 2.0], k=0))
+    outage = epoch_of([0.0, 0.3], k=1)
+    outage = Epoch(outage.index, outage.time, outage.innovation, available=np.array([False, True]))
+    statistic = detector.update(outage)
+    assert statistic[0] == 0.0
+    assert statistic[1] == pytest.approx(2.3 / 5 / 1.28)
+    statistic = detector.update(epoch_of([2.0, 2.0], k=2))
+    assert statistic[0] == pytest.approx(2.0 / 1.5)
+    assert statistic[1] == pytest.approx(4.3 / 5 / 1.28)
+
+
+def facts(sigma, drift):
+    return FilterFacts("made up", 1.0, np.ones(6), (ODOMETER,), lambda burn_in: None, sigma, drift)
+
+
+@pytest.mark.parametrize(
+    ("specification", "sigma", "drift", "message"),
+    [
+        ("acna:preset=song,position=auxiliary", 0.59, 0.2, None),
+        ("acna:preset=song,position=auxiliary", 0.4, 0.2, r"Th_j = 1.5 m .* from 0.4 to 1.2 m"),
+        ("acna:preset=song,position=auxiliary", 1.4, 0.2, r"Th_s = 1.28 m .* from 1.4 to 4.2 m"),
+        ("acna:preset=song,position=auxiliary", 0.59, 1.3, r"at least what dead reckoning .* 1.3 m .*eq 21"),
+        ("acna:preset=song", 0.4, 5.0, None),
+        ("acna:position=auxiliary", 0.01, 5.0, None),
+        ("acna:preset=song,position=auxiliary", None, None, None),
+    ],
+)
+def test_the_constraints_of_the_paper(specification, sigma, drift, message):
+    """Eqs 17 to 21, where the receiver's sigma is known and the thresholds are given."""
+    detector = make_detector(specification)
+    if message is None:
+        detector.know(facts(sigma, drift))
+    else:
+        with pytest.raises(ValueError, match=message):
+            detector.know(facts(sigma, drift))

@@ -1,0 +1,90 @@
+"""The parameter study of ACNA: its tests against the detector, its rates, and the command."""
+
+import numpy as np
+import pytest
+
+from spoofgym.attacks import make_attack
+from spoofgym.detectors import Acna
+from spoofgym.evaluation import acna_study
+from spoofgym.evaluation.acna_study import ATTACKS, PUBLISHED, Rates, play
+from spoofgym.responses.exclude import Exclude
+from spoofgym.scenarios import make_scenario
+from spoofgym.simulation import Simulation
+
+
+class OneOfAcna(Acna):
+    """One test of the published detector, without a warm memory, as the study plays it."""
+
+    def __init__(self, test):
+        super().__init__(preset="song", position="auxiliary")
+        other = 1e9
+        if test == "jump":
+            self.slow_threshold = other
+        else:
+            self.jump_threshold = other
+        self.memory = 0
+
+    def know(self, facts):
+        """The thresholds are out of the paper's bounds by intention."""
+
+
+@pytest.mark.parametrize("test", ["jump", "slow"])
+def test_the_published_pair_is_the_detector(test):
+    """Counted by hand over two runs of the same seeds in the same loop."""
+    window, level = PUBLISHED[test]
+    rates = play("song-robot:odometer=set-b", test, np.array([window, 20]), np.array([level, 6.0]), 2, 7)
+    false = missed = 0
+    for seed in (7, 8):
+        scenario = make_scenario("song-robot:odometer=set-b")
+        simulation = Simulation(scenario, make_attack(ATTACKS[test]), [OneOfAcna(test)], Exclude(), 1, seed)
+        simulation.reset()
+        for k in range(1, 301):
+            simulation.resolve()
+            simulation.observe()
+            if k <= 150:
+                false += simulation.alarm[0]
+            else:
+                missed += not simulation.alarm[0]
+    assert rates.false_alarm[0] == pytest.approx(false / 300)
+    assert rates.missed[0] == pytest.approx(missed / 300)
+    np.testing.assert_allclose(rates.accuracy, 1.0 - 0.5 * rates.total)
+
+
+def test_thresholds_at_the_ends():
+    """A threshold of zero always alarms, one of a kilometre never does; a window misses its own length."""
+    rates = play("song-robot", "jump", np.array([1, 1, 4]), np.array([0.0, 1000.0, 10.0]), 1, 0)
+    np.testing.assert_array_equal(rates.false_alarm, [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(rates.missed, [0.0, 1.0, 3.0 / 150.0])
+
+
+def test_the_command(capsys, monkeypatch, tmp_path):
+    def few(scenario, test, runs, seed):
+        shape = (20, len(acna_study.THRESHOLDS[test]))
+        values = np.linspace(0.0, 1.0, shape[0] * shape[1]).reshape(shape)
+        return Rates(values, 0.5 - 0.5 * values, 0.5 - 0.5 * values)
+
+    monkeypatch.setattr(acna_study, "study", few)
+    acna_study.main(["--runs", "1", "--figure", str(tmp_path / "deep" / "study.png")])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "song-robot, 1 runs per pair from seed 0"
+    assert sum(line.startswith("| jump |") for line in lines) == 7
+    assert "| slow | published, n_s = 5 | 1.28 |" in "\n".join(lines)
+    assert (tmp_path / "deep" / "study.png").stat().st_size > 10_000
+
+
+def test_the_study_has_all_pairs(monkeypatch):
+    monkeypatch.setattr(acna_study, "EPOCHS", np.array([1, 2, 3]))
+    monkeypatch.setitem(acna_study.THRESHOLDS, "slow", np.array([0.5, 1.28]))
+    grid = acna_study.study("song-robot", "slow", 1, 0)
+    assert grid.accuracy.shape == (3, 2)
+    alone = play("song-robot", "slow", np.array([3]), np.array([0.5]), 1, 0)
+    assert grid.accuracy[2, 0] == alone.accuracy[0]
+
+
+def test_bad_arguments_are_refused(capsys):
+    with pytest.raises(SystemExit):
+        acna_study.main(["--scenario", "liu-flight:horizon=10"])
+    assert "needs odometer, which scenario 'liu-flight:horizon=10' does not give" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        acna_study.main(["--runs", "0"])
+    assert "runs must be a whole number, 1 or more, got 0" in capsys.readouterr().err
