@@ -51,7 +51,7 @@ def white_statistics(factor: Floats, num_epochs: int, facts: FilterFacts | None 
 
 
 class _BurnIn(Detector):
-    """A detector that never alarms, and keeps the highest statistic of each run before epoch 0 in ``peak``."""
+    """A detector that never alarms, and keeps the highest statistic of each run in its burn-in in ``peak``."""
 
     threshold = math.inf
 
@@ -84,7 +84,8 @@ class _BurnIn(Detector):
     def update(self, epoch: Epoch) -> Floats:
         """The detector's statistic, (N,)."""
         statistic = self._detector.update(epoch)
-        self.peak = np.where(epoch.index < 0, np.maximum(self.peak, statistic), self.peak)
+        before = (epoch.index < 0) & (epoch.index >= -self.memory)
+        self.peak = np.where(before, np.maximum(self.peak, statistic), self.peak)
         return statistic
 
 

@@ -197,6 +197,7 @@ class Simulation:
         for _ in range(self.burn_in):
             alarmed |= self._test(self._clean_epoch(runs), part)
             self.navigator.resolve(use, runs)
+        self.navigator.restart_auxiliary(runs)
         for name, detector in bank.items():
             detector.take(places, part[name])
         return alarmed
@@ -231,13 +232,17 @@ class Simulation:
         return epochs
 
     def _test(self, epoch: Epoch, detectors: dict[str, Detector]) -> NDArray[np.bool_]:
-        """Let the detectors see an epoch, in order; whether any alarms, (n,)."""
+        """Let the detectors see an epoch, in order; whether any alarms, (n,).
+
+        In a burn-in, which is as long as the longest memory, an alarm counts within the detector's own memory only: so a
+        detector begins its games in the same way, whatever stands beside it.
+        """
         alarm = np.zeros(len(epoch.index), dtype=bool)
         for name, detector in detectors.items():
             statistic = detector.update(epoch)
             epoch.statistics[name] = statistic
             assert detector.threshold is not None
-            alarm |= statistic > detector.threshold
+            alarm |= (statistic > detector.threshold) & (epoch.index >= -detector.memory)
         return alarm
 
     def _merge(self, runs: Runs, part: Epoch) -> None:

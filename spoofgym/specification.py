@@ -2,8 +2,8 @@
 
 Command line, environment arguments, opponent pools, tables and files all name a detector, an attack, a response or a
 scenario this way: ``snapshot``, ``windowed:n=20,arl0=1e5``, ``ramp:0.5,direction=135``,
-``recorded:PATH,grade=tactical``. A part within a part has ``/`` in place of its commas:
-``ensemble:snapshot+windowed:n=20/threshold=115,arl0=1e4``.
+``recorded:PATH,grade=tactical``. A part within a part has ``/`` in place of its commas
+and ``~`` in place of ``+``: ``ensemble:snapshot+windowed:n=20/threshold=115+window-bank:lengths=5~20,arl0=1e4``.
 """
 
 from __future__ import annotations
@@ -70,14 +70,18 @@ class Specification:
         return self.name + (":" + ",".join(pieces) if pieces else "")
 
 
+NESTED = str.maketrans(",+", "/~")
+UNNESTED = str.maketrans("/~", ",+")
+
+
 def nest(text: str) -> str:
-    """A specification as the value of another one: ``/`` stands for the comma between its options."""
-    return text.replace(",", "/")
+    """A specification as the value of another one: ``/`` stands for the comma between its options, ``~`` for ``+``."""
+    return text.translate(NESTED)
 
 
 def unnest(text: str) -> str:
     """The specification that `nest` wrote."""
-    return text.replace("/", ",")
+    return text.translate(UNNESTED)
 
 
 def spell(name: str, value: object = None, **options: object) -> str:

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks.profiles import Ramp, SlowChange
+from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot, Windowed
+from spoofgym.navigation.interface import Demands
 from spoofgym.responses.exclude import Exclude
+from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation
@@ -240,3 +244,28 @@ def test_thresholds_that_alarm_in_every_burn_in_are_told():
 def test_a_scenario_that_does_not_fit_is_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         dataclasses.replace(matched(), **changes)
+
+
+class BeforeTheGame(Detector):
+    """Alarms in every epoch before the game, and in none of it."""
+
+    name = "before-the-game"
+    threshold = 0.5
+
+    def update(self, epoch):
+        return (epoch.index < 0).astype(float)
+
+
+@pytest.mark.parametrize("fidelity", ["linear", "strapdown"])
+def test_a_burn_in_for_another_detector_changes_nothing_for_one_without_memory(fidelity):
+    """Neither is its alarm heard before its own memory, nor has the unaided solution drifted before the game."""
+    scenario = make_scenario("liu-flight:imu=tactical,horizon=5")
+    detectors = [BeforeTheGame(), make_detector("windowed:n=30,threshold=1000")]
+    demands = Demands(auxiliary=True)
+    simulation = Simulation(scenario, None, detectors, None, 3, 0, fidelity=fidelity, demands=demands)
+    assert simulation.burn_in == 29
+    simulation.reset()
+    assert not simulation.alarm.any()
+    np.testing.assert_array_equal(simulation.navigator.auxiliary_offset, 0.0)
+    simulation.resolve()
+    assert np.all(simulation.navigator.auxiliary_offset[:, :2] != 0.0)

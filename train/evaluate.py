@@ -74,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
         help="every --detector against every --attack and --attacker at an equal false-alarm rate (default: all)")
     add("--arl0", type=above_one, help="of the matrix, epochs between false alarms (default: 10000)")
     add("--roc", type=picture, metavar="FILE", help="with --matrix: draw ROC and DET curves of one attack")
-    add("--roc-attack", default="ramp:0.2", help="which attack of the matrix that is (default: %(default)s)")
+    add("--roc-attack", default="ramp:0.1", help="which attack of the matrix that is (default: %(default)s)")
     add("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
     add("--episodes", type=count,

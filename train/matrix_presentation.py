@@ -169,7 +169,7 @@ def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     roc.set_xlabel("games with a false alarm")
     roc.set_ylabel("games with the attack detected")
     roc.set_title(f"ROC, {attack}, {report['scenario']}", loc="left", fontsize=11)
-    roc.legend(fontsize=7.5, loc="lower right", framealpha=0.9)
+    roc.legend(fontsize=7.5, loc="upper left", framealpha=0.9)
     ticks = stats.norm.ppf(DET_TICKS)
     det.set_xticks(ticks, [f"{100 * p:g}" for p in DET_TICKS])
     det.set_yticks(ticks, [f"{100 * p:g}" for p in DET_TICKS])

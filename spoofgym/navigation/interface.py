@@ -162,7 +162,7 @@ class Demands:
     Attributes:
         excludes: a fix can be left out, reset to, or weighted: each run has a covariance of its own.
         history: epochs that a decision can take back; 0 = none. Needs ``excludes``.
-        auxiliary: an inertial solution that no fix has corrected since the episode began.
+        auxiliary: an inertial solution that no fix has corrected since the game began, after the burn-in.
     """
 
     excludes: bool = False
@@ -205,6 +205,9 @@ class Navigator(Protocol):
 
     def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
         """Take fixes back, then apply the present one, or reset to it, where the decision says so."""
+
+    def restart_auxiliary(self, runs: Runs) -> None:
+        """Let the unaided inertial solution of runs, where there is one, begin anew from the filter's."""
 
     @property
     def error(self) -> Floats:

@@ -103,6 +103,10 @@ class LinearNavigator:
             self.bias_steps[runs, k] = following - value
             value = following
 
+    def restart_auxiliary(self, runs: Runs) -> None:
+        """Let the unaided inertial solution of runs, where there is one, begin anew from the filter's."""
+        self.auxiliary[runs] = 0.0
+
     def propagate(self, runs: Runs | None = None) -> None:
         """Carry runs (all by default) to their next epoch."""
         model = self.model

@@ -115,6 +115,10 @@ class StrapdownNavigator:
         self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
         self.bias[runs] = self.true_bias[runs] - error[:, 9:15]
 
+    def restart_auxiliary(self, runs: Runs) -> None:
+        """Let the unaided inertial solution of runs, where there is one, begin anew from the filter's."""
+        self.auxiliary[runs] = 0.0
+
     def propagate(self, runs: Runs | None = None) -> None:
         """Carry runs (all by default) to their next epoch by inertial measurements."""
         runs = self._all if runs is None else runs

@@ -209,6 +209,13 @@ def test_the_name_builds_the_same_detector(specification):
     assert (again.threshold, again.target_arl0) == (detector.threshold, detector.target_arl0)
 
 
+def test_a_member_whose_options_hold_a_plus_is_spelled_with_a_tilde():
+    detector = make_detector("ensemble:snapshot+window-bank:lengths=5~20/budget=1e-4,arl0=300")
+    assert detector.members[1].name == "window-bank:lengths=5+20,budget=0.0001,arl0=300"
+    assert make_detector(detector.name).name == detector.name
+    assert "lengths=5~20" in detector.name
+
+
 def test_members_are_nested_with_slash_and_plus_and_take_its_arl0():
     detector = make_detector("ensemble:windowed:n=5/threshold=50+signed-mean:n=10+px4-gate:gate=7,arl0=2000")
     names = ["windowed:n=5,threshold=50", "signed-mean:n=10,arl0=2000", "px4-gate:gate=7"]
