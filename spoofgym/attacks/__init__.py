@@ -23,6 +23,7 @@ from spoofgym.attacks.meaconing import Meaconing
 from spoofgym.attacks.noise_matched import NoiseMatched
 from spoofgym.attacks.pool import POPULATIONS, AttackPool
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
+from spoofgym.attacks.song_mix import SongMix
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
 from spoofgym.specification import Specification, build, unnest
 
@@ -38,6 +39,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "ramp": Ramp,
     "jump-ramp": JumpRamp,
     "slow-change": SlowChange,
+    "song-mix": SongMix,
     "exponential": Exponential,
     "circle": Circle,
     "meaconing": Meaconing,

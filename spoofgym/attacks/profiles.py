@@ -114,23 +114,25 @@ class RandomProfile(Attack):
         variance: of the disturbance, m².
         onset: scenario time, s; None = the start of the game.
         axes: letters of the axes that are spoofed: ``e``, ``n``, ``u``.
+        end: scenario time of the last spoofed fix, s; None = that of the game.
 
     Raises:
-        ValueError: a negative variance, a value that is not finite, or axes other than these letters, each at most
-            once.
+        ValueError: a negative variance, a value that is not finite, axes other than these letters, each at most once,
+            or an end that is not after the onset.
     """
 
     kind: str
     default_mean: float
     default_variance: float
 
-    def __init__(self, mean: float, variance: float, onset: float | None, axes: str) -> None:
+    def __init__(self, mean: float, variance: float, onset: float | None, axes: str, end: float | None) -> None:
         self.mean = validation.finite(self.kind, "mean", mean)
         self.variance = validation.non_negative(self.kind, "variance", variance)
         self.onset = None if onset is None else validation.finite(self.kind, "onset", onset)
         if not axes or any(letter not in AXES or axes.count(letter) > 1 for letter in axes):
             raise ValueError(f"{self.kind}: axes must be letters of 'enu', each at most once, got {axes!r}")
         self.axes = axes
+        self.end = None if end is None else validation.finite(self.kind, "end", end)
 
     @property
     def name(self) -> str:
@@ -141,23 +143,36 @@ class RandomProfile(Attack):
             variance=None if self.variance == self.default_variance else self.variance,
             onset=self.onset,
             axes=None if self.axes == "en" else self.axes,
+            end=self.end,
         )
 
     def bind(self, timeline: Timeline, num_runs: int) -> None:
         """Fit the attack to a game and allocate an episode's offsets.
 
         Raises:
-            ValueError: the attack starts before the game or after its end.
+            ValueError: the attack starts before the game or after its end, or ends before it starts.
         """
         super().bind(timeline, num_runs)
+        if self.end is not None and not self.end > self._onset:
+            raise ValueError(f"attack {self.name!r}: end {self.end:g} s must be after the onset, {self._onset:g} s")
         index = np.arange(timeline.num_epochs + 1)
         clock = Clock(index, np.asarray(timeline.start + timeline.interval * index, dtype=np.float64))
         self._runs = np.arange(num_runs)
         self._columns = [AXES.index(letter) for letter in self.axes]
         self._elapsed = self.elapsed(clock)
         self._started = self.started(clock)
+        self._ended = self.ended(clock)
         self._rows = self._block_length(timeline)
         self._offsets = np.zeros((num_runs, len(index), 3))
+
+    def ended(self, clock: Clock) -> Flags:
+        """Whether the epoch lies after the end, (N,); rounding of its time does not count."""
+        end = np.inf if self.end is None else self.end
+        return clock.time - end > 1e-6 * self._timeline.interval
+
+    def active(self, clock: Clock) -> Flags:
+        """From the onset to the end, (N,)."""
+        return self.started(clock) & ~self.ended(clock)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the offsets of new episodes."""
@@ -166,6 +181,7 @@ class RandomProfile(Attack):
         disturbance = self.mean + np.sqrt(self.variance) * normal
         offsets = np.zeros((len(runs), len(self._elapsed), 3))
         offsets[:, :, self._columns] = self._profile(disturbance, self._elapsed, self._started)
+        offsets[:, self._ended] = 0.0
         self._offsets[runs] = offsets
 
     def offset(self, clock: Clock) -> Floats:
@@ -203,8 +219,9 @@ class Jump(RandomProfile):
         variance: float = default_variance,
         onset: float | None = None,
         axes: str = "en",
+        end: float | None = None,
     ) -> None:
-        super().__init__(mean, variance, onset, axes)
+        super().__init__(mean, variance, onset, axes, end)
 
     def _block_length(self, timeline: Timeline) -> int:
         return timeline.num_epochs + 1
@@ -232,8 +249,9 @@ class SlowChange(RandomProfile):
         variance: float = default_variance,
         onset: float | None = None,
         axes: str = "en",
+        end: float | None = None,
     ) -> None:
-        super().__init__(mean, variance, onset, axes)
+        super().__init__(mean, variance, onset, axes, end)
 
     def _block_length(self, timeline: Timeline) -> int:
         return int(np.ceil(timeline.end - timeline.start)) + 1

@@ -87,6 +87,10 @@ class DefenderGame:
         given = config.detectors if isinstance(config.detectors, tuple | list) else (config.detectors,)
         # copies: an object that the caller gives to two environments must not carry memories from one to the other
         detectors = [deepcopy(make_detector(part)) for part in given]
+        for detector in detectors:
+            scenario.facts.require(
+                f"detector {detector.name!r}", detector.needs, "choose others: detectors=('snapshot', 'windowed:n=5')"
+            )
         if not beside:
             detectors = calibrated_all(detectors, scenario)
         names = [detector.name for detector in detectors]
@@ -112,9 +116,7 @@ class DefenderGame:
             confounders=self.confounders,
         )
         self.features = DefenderFeatures(scenario, self.simulation, names, num_lanes)
-        self.privileged = PrivilegedState(
-            self.simulation, self.attacks, self.confounders, scenario.defender_scale
-        )
+        self.privileged = PrivilegedState(self.simulation, self.attacks, self.confounders, scenario.defender_scale)
         self.fields = self.features.fields
         self.observation_space = observation_space(self.fields)
         self.action_space = spaces.MultiDiscrete([2, len(self.depths)])

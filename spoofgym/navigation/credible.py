@@ -138,6 +138,10 @@ class CredibleNavigator:
         for run in runs.tolist():
             self.displacement[run] = draw_displacement(model.motion, model.odometer, model.grade, streams(run, "imu"))
 
+    def restart_auxiliary(self, runs: Runs) -> None:
+        """Set the auxiliary position of runs to the filter's, whatever the rule."""
+        self.state[runs, 4:] = self.state[runs, :2]
+
     def propagate(self, runs: Runs | None = None) -> None:
         """Carry runs (all by default) to their next epoch by odometer and INS."""
         runs = self._all if runs is None else runs

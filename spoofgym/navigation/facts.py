@@ -36,8 +36,13 @@ class FilterFacts:
     fix_sigma: float | None = None
     auxiliary_sigma: float | None = None
 
-    def require(self, owner: str, needs: tuple[str, ...]) -> None:
+    def require(self, owner: str, needs: tuple[str, ...], remedy: str = "") -> None:
         """Refuse a part that needs something the scenario does not offer.
+
+        Args:
+            owner: the part, for the message.
+            needs: of the part.
+            remedy: what the caller can do about it, for the message.
 
         Raises:
             ValueError: naming the part, what it needs, and what there is.
@@ -46,5 +51,5 @@ class FilterFacts:
         if missing:
             raise ValueError(
                 f"{owner} needs {' and '.join(missing)}, which scenario {self.scenario!r} does not give; it gives: "
-                f"{', '.join(self.offers)}"
+                f"{', '.join(self.offers)}" + (f"; {remedy}" if remedy else "")
             )

@@ -33,6 +33,7 @@ from spoofgym.streams import RunStreams
 COURT = (13.4, 6.1)
 """Sides of the rectangle, m."""
 SPEED = 0.5
+"""Of the robot, m/s; the spoofer's limit on each axis, too, which is the mean of the paper's slow change."""
 CORNER = 0.5
 """Radius of the corners, m."""
 START_YAW = math.radians(248.0)
@@ -121,8 +122,8 @@ class SongRobot(Scenario):
     offers = (ODOMETER, LINEAR_MODEL)
     matched = False
     dimension = 3
-    drag_off_rate = (1.0, 1.0, 1.0)
-    error_scale = 1.0
+    drag_off_rate = (SPEED, SPEED, SPEED)
+    error_scale = 5.0
     defender_scale = 1.0
     depth_table = DEPTHS
 

@@ -143,6 +143,33 @@ def test_axes_and_moments_are_options(name):
 
 
 @pytest.mark.parametrize("name", RANDOM)
+def test_after_the_end_fixes_are_clean(name):
+    whole, ending = (bound(specification, 4) for specification in (name, f"{name}:end=850"))
+    offsets = offsets_of(ending, 4)
+    np.testing.assert_array_equal(offsets[:51], offsets_of(whole, 4)[:51])
+    np.testing.assert_array_equal(offsets[51:], 0.0)
+    active = [ending.active(clock_at([k] * 4)).all() for k in range(121)]
+    assert np.flatnonzero(active).tolist() == list(range(1, 51))
+
+
+@pytest.mark.parametrize("end", [800.0, 700.0])
+def test_an_end_before_the_onset_is_refused(end):
+    with pytest.raises(ValueError, match="must be after the onset, 800 s"):
+        make_attack(f"jump:end={end}").bind(TIMELINE, 1)
+
+
+@pytest.mark.parametrize(("start", "interval"), [(20.0, 0.1), (0.3, 0.1), (100.0, 1 / 3)])
+def test_rounding_of_time_does_not_move_an_end(start, interval):
+    timeline = Timeline(start, interval, 100)
+    exact = start + interval * 6
+    for end in (exact, np.nextafter(exact, 0.0), np.nextafter(exact, 1e9)):
+        attack = Jump(end=end)
+        attack.bind(timeline, 1)
+        attack.reset(np.array([0]), RunStreams.from_seed(0, 1))
+        assert np.flatnonzero(offsets_of(attack, timeline=timeline)[:, 0, 0])[-1] == 6
+
+
+@pytest.mark.parametrize("name", RANDOM)
 def test_run_i_is_the_same_for_any_number_of_runs(name):
     whole = offsets_of(bound(name, 64), 64)
     np.testing.assert_array_equal(offsets_of(bound(name, 5), 5), whole[:, :5])
@@ -189,6 +216,8 @@ def test_the_block_of_an_episode_does_not_depend_on_the_onset(name):
         "jump:mean=5,variance=0,onset=810,axes=n",
         "slow-change",
         "slow-change:mean=1",
+        "jump:onset=810,end=830",
+        "slow-change:end=830",
         "ramp:0.5",
         "ramp:0.5,direction=135,onset=810",
         "jump-ramp:0.5,jump=7",

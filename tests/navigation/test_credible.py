@@ -266,6 +266,23 @@ class ThirdRunOnly(Attack):
         return 5.0 * (np.arange(self._num_runs) == 2)[:, None] * np.ones(3)
 
 
+def test_a_restarted_auxiliary_position_is_the_filters_in_these_runs_alone():
+    simulation = Simulation(
+        make_scenario(f"{SHORT},auxiliary=free,odometer=set-b"), None, (), None, 3, 1, demands=Demands(auxiliary=True)
+    )
+    simulation.reset()
+    for _ in range(5):
+        simulation.resolve()
+        simulation.observe()
+    before, error = simulation.navigator.auxiliary_offset, simulation.navigator.error
+    simulation.navigator.restart_auxiliary(np.array([0, 2]))
+    after = simulation.navigator.auxiliary_offset
+    assert before[:, :2].all()
+    np.testing.assert_array_equal(after[[0, 2]], 0.0)
+    np.testing.assert_array_equal(after[1], before[1])
+    np.testing.assert_array_equal(simulation.navigator.error, error)
+
+
 def test_runs_are_bit_identical_for_any_number_and_threads():
     use = [True] * 10 + [False] * 5 + [True] * 10
     back = {12: 3}

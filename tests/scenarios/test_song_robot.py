@@ -139,6 +139,11 @@ def test_spoofer_checkers(arguments):
     env.close()
 
 
+def test_the_defender_is_told_that_its_default_detectors_do_not_fit():
+    with pytest.raises(ValueError, match=r"'relative-motion' needs inertial solution.*; choose others: detectors="):
+        gym.make("spoofgym/Defender-v0", scenario="song-robot")
+
+
 def test_defender_checkers():
     detectors = ("snapshot:threshold=25.9", SONG)
     env = gym.make("spoofgym/Defender-v0", scenario="song-robot:horizon=60", detectors=detectors)
