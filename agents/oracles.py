@@ -16,17 +16,20 @@ from spoofgym.scenario import Scenario
 MEANS = (10, 30, 60)
 WEIGHTS = (0.02, 0.05, 0.1)
 MISSED = 0.5
-"""Share of the games in which the worst case against a window is missed by it."""
+"""Probability with which the last, full window misses the worst case against it."""
+BEST, WORST, GATE, SIGNED = "best-against-snapshot", "worst-against-window", "lp-gate", "lp-signed"
+ORACLES = (BEST, WORST, GATE, SIGNED)
 
 
 def oracles(scenario: Scenario, arl0: float) -> list[Attack]:
     """Optimal attacks against monitors at an ARL₀; none where the filter is not matched or fixes have velocity.
 
     - ``best-against-snapshot``: the bounded optimum of the game against the chi-square test of each epoch.
-    - ``worst-against-window``: the closed form that the chi-square test of a window as long as the game misses in half
-      of the games.
-    - ``zero-alarm-gate``: the linear programme against a gate on each axis, its mean within 30 % of the thresholds.
-    - ``zero-alarm-signed``: the same against the gate, means of 10, 30 and 60 innovations and three EWMAs together.
+    - ``worst-against-window``: the closed form that the chi-square sum over the whole game, at its end, misses with
+      probability one half.
+    - ``lp-gate``: the linear programme of zero-alarm attacks against a gate on each axis: the mean innovation stays
+      within 30 % of the thresholds, which leaves the rest to the noise. It is no promise of no alarm.
+    - ``lp-signed``: the same against the gate, means of 10, 30 and 60 innovations and three EWMAs together.
 
     Args:
         scenario: of the games.
@@ -40,12 +43,11 @@ def oracles(scenario: Scenario, arl0: float) -> list[Attack]:
     window, _ = cumulative_optimum(model, epochs, _threshold(f"windowed:n={epochs}", scenario, arl0), MISSED)
     gates = gate(float(stats.norm.isf(1.0 / (6.0 * arl0))))
     return [
-        OffsetSequence("best-against-snapshot", best.outcome.offsets),
-        OffsetSequence("worst-against-window", window.offsets),
-        OffsetSequence("zero-alarm-gate", zero_alarm(model, gates, drag_off_rate=rates).offsets),
+        OffsetSequence(BEST, best.outcome.offsets),
+        OffsetSequence(WORST, window.offsets),
+        OffsetSequence(GATE, zero_alarm(model, gates, drag_off_rate=rates).offsets),
         OffsetSequence(
-            "zero-alarm-signed",
-            zero_alarm(model, [*gates, *signed_tests(scenario, arl0)], drag_off_rate=rates).offsets,
+            SIGNED, zero_alarm(model, [*gates, *signed_tests(scenario, arl0)], drag_off_rate=rates).offsets
         ),
     ]
 

@@ -172,7 +172,20 @@ def measure_arl0(
 
 # --- detectors ready for a scenario ---------------------------------------------------------------------------------
 
-_KNOWN: dict[tuple[str, str, str], Setting] = {}
+MOST_ARL0 = 1e7
+"""Epochs: a larger one takes more clean epochs than anybody waits for."""
+
+Place = tuple[object, object, str]
+_KNOWN: dict[Place, Setting] = {}
+
+
+def _who(detector: Detector) -> object:
+    """What tells a detector from others: names and classes, its members' included."""
+    return (detector.name, type(detector), *(_who(member) for member in detector.members))
+
+
+def _place(detector: Detector, scenario: Scenario, fidelity: str) -> Place:
+    return _who(detector), calibration_cache.identity(scenario), fidelity
 
 
 def calibrated(detector: Detector, scenario: Scenario, fidelity: str = "linear") -> Detector:
@@ -188,8 +201,8 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
     runs of the scenario, which detectors share; always with the same noise. A growth that the detector subtracts is
     fitted before. In a recorded scenario a shipped threshold for white innovations stays, without an ARL₀.
 
-    What was found is remembered for each scenario and detector: in the program, and on disk (`calibration_cache`) where
-    the names of both say all about them.
+    A detector that was calibrated in another scenario is calibrated anew. What was found is remembered for each
+    scenario and detector: in the program, and on disk (`calibration_cache`) where the names of both say all about them.
 
     The members of a detector are calibrated before it.
 
@@ -202,6 +215,12 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
         scenario.facts.require(f"detector {detector.name!r}", detector.needs)
         detector.bind(1, scenario.dimension)
     wanted = [detector for detector in detectors if _needs_calibration(detector, scenario)]
+    for detector in wanted:
+        if detector.target_arl0 is not None and detector.target_arl0 > MOST_ARL0:
+            raise ValueError(
+                f"detector {detector.name!r}: arl0 must be {MOST_ARL0:g} epochs at most to be calibrated, got "
+                f"{detector.target_arl0:g}; give a threshold"
+            )
     if wanted and not scenario.random:
         raise ValueError(
             f"detector {wanted[0].name!r} cannot be calibrated in scenario {scenario.name!r}, which has one "
@@ -210,17 +229,19 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
     missing = {detector.name: detector for detector in wanted if _recall(detector, scenario, fidelity) is None}
     settings = _find(list(missing.values()), scenario, fidelity) if missing else {}
     for name, setting in settings.items():
-        _KNOWN[name, scenario.name, fidelity] = setting
+        _KNOWN[_place(missing[name], scenario, fidelity)] = setting
         if key := _disk_key(missing[name], scenario, fidelity):
             calibration_cache.store(key, setting, f"{name} in {scenario.name}, {fidelity}")
     return [
-        _with(detector, _KNOWN[detector.name, scenario.name, fidelity]) if detector in wanted else detector
+        _with(detector, _KNOWN[_place(detector, scenario, fidelity)], calibration_cache.identity(scenario))
+        if detector in wanted
+        else detector
         for detector in detectors
     ]
 
 
 def _with_members(detector: Detector, scenario: Scenario, fidelity: str) -> Detector:
-    if not detector.members or detector.calibrated:
+    if not detector.members or (detector.calibrated and detector.origin in (None, calibration_cache.identity(scenario))):
         return detector
     ready = copy.copy(detector)
     ready.members = calibrated_all(detector.members, scenario, fidelity)
@@ -229,7 +250,8 @@ def _with_members(detector: Detector, scenario: Scenario, fidelity: str) -> Dete
 
 def _needs_calibration(detector: Detector, scenario: Scenario) -> bool:
     if detector.calibrated:
-        return False
+        elsewhere = detector.origin is not None and detector.origin != calibration_cache.identity(scenario)
+        return elsewhere and detector.target_arl0 is not None
     if detector.lacks_slope:
         return True
     if detector.target_arl0 is None:
@@ -241,13 +263,15 @@ def _disk_key(detector: Detector, scenario: Scenario, fidelity: str) -> str | No
     """The name of a result on disk; None where the names of detector and scenario do not say all about them."""
     if not (calibration_cache.spelled_out(detector) and calibration_cache.spelled_out_scenario(scenario)):
         return None
+    if any(member.calibrated and member.origin is None for member in detector.members):
+        return None
     numbers = (RUNS, FIRST_ALARMS, SIMULATED_FIRST_ALARMS, SLOPE_RUNS)
     return calibration_cache.key(scenario.name, detector.name, fidelity, *map(str, numbers))
 
 
 def _recall(detector: Detector, scenario: Scenario, fidelity: str) -> Setting | None:
     """What was found before, in this program or in an earlier one."""
-    place = (detector.name, scenario.name, fidelity)
+    place = _place(detector, scenario, fidelity)
     if place not in _KNOWN and (key := _disk_key(detector, scenario, fidelity)):
         setting = calibration_cache.load(key)
         if setting is not None:
@@ -255,7 +279,7 @@ def _recall(detector: Detector, scenario: Scenario, fidelity: str) -> Setting | 
     return _KNOWN.get(place)
 
 
-def _with(detector: Detector, setting: Setting) -> Detector:
+def _with(detector: Detector, setting: Setting, origin: object = None) -> Detector:
     """A copy of the detector with its slope and its threshold set."""
     ready = copy.copy(detector)
     if setting.slope is not None:
@@ -264,7 +288,7 @@ def _with(detector: Detector, setting: Setting) -> Detector:
         interval = None
         if setting.low is not None:
             interval = setting.low, math.inf if setting.high is None else setting.high
-        ready.set_threshold(setting.threshold, setting.arl0, interval)
+        ready.set_threshold(setting.threshold, setting.arl0, interval, origin)
     return ready
 
 
@@ -274,8 +298,8 @@ def _find(detectors: Sequence[Detector], scenario: Scenario, fidelity: str) -> d
     groups: dict[int, list[Detector]] = {}
     for detector in detectors:
         if scenario.matched and not detector.needs_view and detector.target_arl0 is not None:
-            factor = scenario.linear_model().innovation_factor[0]
-            clean = white_statistics(factor, scenario.timeline.num_epochs, scenario.facts)
+            factors = scenario.linear_model().innovation_factor
+            clean = white_statistics(factors, scenario.timeline.num_epochs, scenario.facts)
             result = calibrate(detector, clean, detector.target_arl0)
             found[detector.name] = _setting(result, None)
         else:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 import spoofgym
 from spoofgym.detectors import make_detector
@@ -29,7 +30,7 @@ from spoofgym.scenarios import make_scenario
 SOURCES = (
     *("sensors/*.py", "navigation/*.py", "detectors/*.py", "scenarios/*.py", "attacks/*.py"),
     *("simulation.py", "scenario.py", "trajectory.py", "geodesy.py", "streams.py", "arrays.py"),
-    *("calibration.py", "clean_statistics.py", "first_alarms.py"),
+    *("specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
 )
 
 
@@ -81,8 +82,8 @@ def folder() -> Path | None:
 
 
 def key(*parts: str) -> str:
-    """Name of the result that these texts and the source decide."""
-    return hashlib.sha256(json.dumps([SOURCE, *parts]).encode()).hexdigest()
+    """Name of the result that these texts, the source and the numerical libraries decide."""
+    return hashlib.sha256(json.dumps([SOURCE, np.__version__, scipy.__version__, *parts]).encode()).hexdigest()
 
 
 def load(name: str) -> Setting | None:
@@ -135,6 +136,11 @@ def spelled_out_scenario(scenario: Scenario) -> bool:
     except (ValueError, OSError):
         return False
     return _alike(scenario, other)
+
+
+def identity(scenario: Scenario) -> object:
+    """What tells a scenario from others: its name, or the object itself where the name does not build it."""
+    return scenario.name if spelled_out_scenario(scenario) else scenario
 
 
 def _alike(one: Any, other: Any) -> bool:

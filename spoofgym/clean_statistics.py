@@ -22,23 +22,25 @@ JointStatistics = Callable[[Sequence[Detector], int, np.random.Generator], list[
 """The same of several detectors on the same clean runs."""
 
 
-def white_statistics(factor: Floats, num_epochs: int, facts: FilterFacts | None = None) -> CleanStatistics:
+def white_statistics(factors: Floats, num_epochs: int, facts: FilterFacts | None = None) -> CleanStatistics:
     """Statistics on the innovations of a matched filter, which are white: residual = L n.
 
     Args:
-        factor: L, lower, (m, m).
+        factors: L, lower, of every epoch (m, m), or of epochs 0..K (K+1, m, m), where epoch 0 stands for those before.
         num_epochs: K, of a run.
         facts: of the filter, for detectors that ask for them.
     """
-    m = len(factor)
+    m = factors.shape[-1]
+    steady = factors.ndim == 2
 
     def statistics(detector: Detector, runs: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         detector.bind(runs, m)
         if facts is not None:
             detector.know(facts)
-        covariance = np.broadcast_to(factor @ factor.T, (runs, m, m))
         kept = np.empty((runs, detector.memory + num_epochs))
         for k in range(kept.shape[1]):
+            factor = factors if steady else factors[max(k - detector.memory, 0)]
+            covariance = np.broadcast_to(factor @ factor.T, (runs, m, m))
             whitened = rng.standard_normal((runs, m))
             residual = np.einsum("nj,ij->ni", whitened, factor)
             nis = np.einsum("nj,nj->n", whitened, whitened)

@@ -11,6 +11,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.calibration_cache import identity
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
 from spoofgym.responses.excluding import ExcludingResponse
@@ -61,7 +62,7 @@ def coasting_nis(scenario: Scenario, fidelity: str = "linear", runs: int = RUNS,
     return nis
 
 
-_KNOWN: dict[tuple[str, str, float], float] = {}
+_KNOWN: dict[tuple[object, str, float], float] = {}
 
 
 def calibrated_reuse(
@@ -86,7 +87,7 @@ def calibrated_reuse(
         return response
     if response.reuse.threshold is not None:
         return response
-    key = (scenario.name, fidelity, p)
+    key = (identity(scenario), fidelity, p)
     if key not in _KNOWN:
         _KNOWN[key] = float(np.quantile(coasting_nis(scenario, fidelity), 1.0 - p, method="higher"))
     return response.with_reuse_threshold(_KNOWN[key])

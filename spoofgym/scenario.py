@@ -262,7 +262,11 @@ class SimulatedScenario(Scenario):
         """
         before = round(self.onset * self.receiver.rate) - 1 - burn_in
         if before < 0:
-            raise ValueError(f"scenario {self.name!r}: a burn-in of {burn_in} epochs reaches before the trajectory")
+            raise ValueError(
+                f"scenario {self.name!r}: the detectors look back {burn_in} epochs, but a burn-in of so many reaches "
+                f"before the trajectory, which has {before + burn_in} before the game: take detectors with a shorter "
+                "memory, or a later onset where there is one"
+            )
         start = cold_start(self.grade, self.receiver, self.tuning)
         return warm_up(start, self._epochs(0, before), self.grade, self.receiver, self.tuning)
 

@@ -234,8 +234,8 @@ class Simulation:
     def _test(self, epoch: Epoch, detectors: dict[str, Detector]) -> NDArray[np.bool_]:
         """Let the detectors see an epoch, in order; whether any alarms, (n,).
 
-        In a burn-in, which is as long as the longest memory, an alarm counts within the detector's own memory only: so a
-        detector begins its games in the same way, whatever stands beside it.
+        In a burn-in, which is as long as the longest memory, an alarm counts within the detector's own memory only: so
+        a detector begins its games in the same way, whatever stands beside it.
         """
         alarm = np.zeros(len(epoch.index), dtype=bool)
         for name, detector in detectors.items():

@@ -112,9 +112,13 @@ def test_shipped_window_threshold_has_its_arl0():
     assert_poisson(result.first_alarms, result.epochs_at_risk / 1e5)
 
 
+class Stub(SimpleNamespace):
+    __hash__ = object.__hash__
+
+
 def scenario_of(factor, *, matched=True, num_epochs=120):
     factors = np.broadcast_to(factor, (num_epochs + 1, *factor.shape))
-    return SimpleNamespace(
+    return Stub(
         name=f"stub-{factor[0, 0]}-{matched}",
         random=True,
         dimension=len(factor),

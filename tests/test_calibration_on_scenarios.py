@@ -4,6 +4,7 @@ Statistical bands: a correct program fails each with a probability below 1e-7 (n
 deviations, 2e-9, where no exact distribution is at hand).
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -13,8 +14,9 @@ from scipy import stats
 from spoofgym import calibration
 from spoofgym.calibration import calibrate, calibrated, measure_arl0
 from spoofgym.clean_statistics import simulated_statistics, white_statistics
-from spoofgym.detectors import make_detector
+from spoofgym.detectors import Ensemble, make_detector
 from spoofgym.detectors.chi_square import WINDOWED_THRESHOLDS
+from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenarios import make_scenario
 
 DEVIATIONS = 6.0
@@ -191,7 +193,45 @@ def test_acna_is_calibrated_in_metres_of_the_scenario(monkeypatch):
     scenario = make_scenario("liu-flight:horizon=30")
     detector = calibrated(make_detector("acna:arl0=100"), scenario)
     assert detector.calibrated
-    factor = scenario.linear_model().innovation_factor[0]
-    single, double = (calibrate(make_detector("acna"), white_statistics(f, 30), 100.0) for f in (factor, 2 * factor))
+    factors = scenario.linear_model().innovation_factor
+    single, double = (calibrate(make_detector("acna"), white_statistics(f, 30), 100.0) for f in (factors, 2 * factors))
     assert double.threshold == pytest.approx(2 * single.threshold, rel=1e-9)
     assert detector.threshold == pytest.approx(single.threshold, rel=1e-9)
+
+
+def test_a_threshold_of_another_scenario_is_calibrated_anew(monkeypatch):
+    monkeypatch.setattr(calibration, "_KNOWN", {})
+    here, there = (make_scenario(f"liu-flight:horizon=20,imu={imu}") for imu in ("navigation", "automotive"))
+    fresh = calibrated(make_detector("rio:arl0=100"), there).threshold
+    carried = calibrated(calibrated(make_detector("rio:arl0=100"), here), there)
+    assert carried.threshold == fresh
+    ready = [calibrated(make_detector(name), here) for name in ("rio:arl0=100", "acna:arl0=100")]
+    union = calibrated(Ensemble(ready, arl0=100.0), there)
+    assert union.members[0].threshold == fresh
+    by_hand = make_detector("rio:arl0=100")
+    by_hand.set_threshold(7.0, 55.0)
+    assert calibrated(by_hand, there).threshold == 7.0
+
+
+def test_two_scenarios_of_one_name_have_thresholds_of_their_own(monkeypatch):
+    monkeypatch.setattr(calibration, "_KNOWN", {})
+    base = make_scenario("liu-flight:horizon=20")
+    bold = dataclasses.replace(base, tuning=FilterTuning(measurement_sigma=(1.85, 1.85, 3.0)))
+    assert base.name == bold.name
+    detector = make_detector("windowed:n=5,arl0=100")
+    assert calibrated(detector, bold).threshold > 1.5 * calibrated(detector, base).threshold
+
+
+def test_white_innovations_have_the_covariance_of_their_epoch():
+    """On a flight whose innovations get smaller by a third, metres mean something else in every epoch."""
+    scenario = make_scenario("shadmehri-flight")
+    detector = calibrated(make_detector("rio:arl0=300"), scenario)
+    clean = simulated_statistics(scenario, "linear")
+    result = measure_arl0(detector, clean, detector.threshold, min_epochs=1e6)
+    # the measured count has a Poisson deviation of 1/√3333, the threshold one of 1/√200: five and a half sigma together
+    assert abs(math.log(result.arl0 / 300.0)) < 5.6 * math.hypot(1.0 / math.sqrt(3333.0), 1.0 / math.sqrt(200.0))
+
+
+def test_a_rate_that_nobody_waits_for_is_refused():
+    with pytest.raises(ValueError, match="arl0 must be 1e\\+07 epochs at most"):
+        calibrated(make_detector("cusum:arl0=1e9"), make_scenario("liu-flight"))

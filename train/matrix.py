@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from agents.learned import LearnedSpoofer
-from agents.oracles import oracles
+from agents.oracles import ORACLES, oracles
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_all
@@ -96,7 +96,7 @@ class Matrix:
 
         Args:
             detectors: specifications; none = `DETECTORS`.
-            attacks: specifications; none = `ATTACKS` and the oracles.
+            attacks: specifications, or names of `ORACLES`; none = `ATTACKS` and all oracles.
             policies: learned spoofers.
             console: for the progress.
 
@@ -126,9 +126,17 @@ class Matrix:
         return [attack.name for attack in self._attacks(attacks)] + [policy.name for policy in policies]
 
     def _attacks(self, given: Sequence[str]) -> list[Attack]:
-        if given:
-            return [make_attack(text) for text in given]
-        return [*(make_attack(text) for text in ATTACKS), *oracles(self.scenario, self.arl0)]
+        asked = given or (*ATTACKS, *ORACLES)
+        known: dict[str, Attack] = {}
+        if any(text in ORACLES for text in asked):
+            known = {attack.name: attack for attack in oracles(self.scenario, self.arl0)}
+        lacking = [text for text in given if text in ORACLES and text not in known]
+        if lacking:
+            raise ValueError(
+                f"attack {lacking[0]!r} needs a matched filter and fixes without velocity, scenario "
+                f"{self.scenario.name!r} has not both"
+            )
+        return [known.get(text) or make_attack(text) for text in asked if text in known or text not in ORACLES]
 
     def _detectors(self, given: Sequence[str]) -> list[Detector]:
         detectors = [make_detector(at_arl0(text, self.arl0)) for text in given]

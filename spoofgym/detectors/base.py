@@ -28,6 +28,7 @@ class Detector(ABC):
         target_arl0: the ARL0 that was asked for, to which calibration sets the threshold; None if the threshold was
             given otherwise.
         calibrated: the threshold was set on clean runs, and ``arl0`` holds where they came from.
+        origin: where that was, as calibration calls it; None where a threshold was set by hand.
         demands: what it asks of the navigator beside innovations, e.g. an unaided inertial solution.
         needs: what the scenario must offer beside innovations, e.g. a linear model of the filter.
         members: detectors within this one, which are calibrated before it.
@@ -41,6 +42,7 @@ class Detector(ABC):
     arl0_interval: tuple[float, float] | None = None
     target_arl0: float | None = None
     calibrated: bool = False
+    origin: object = None
     demands: Demands = Demands()
     needs: tuple[str, ...] = ()
     members: Sequence[Detector] = ()
@@ -71,7 +73,11 @@ class Detector(ABC):
         """The statistic after this epoch, (N,)."""
 
     def set_threshold(
-        self, threshold: float, arl0: float | None = None, interval: tuple[float, float] | None = None
+        self,
+        threshold: float,
+        arl0: float | None = None,
+        interval: tuple[float, float] | None = None,
+        origin: object = None,
     ) -> None:
         """Take a threshold from calibration, and the ARL0 that was measured at it; a later `bind` keeps both.
 
@@ -79,12 +85,13 @@ class Detector(ABC):
             threshold: compared with the statistic.
             arl0: measured at it, epochs.
             interval: its 95 % interval, epochs.
+            origin: where it was measured.
 
         Raises:
             ValueError: the threshold is not a positive finite number.
         """
         self.threshold = validation.above(self.name, "threshold", threshold)
-        self.arl0, self.arl0_interval = arl0, interval
+        self.arl0, self.arl0_interval, self.origin = arl0, interval, origin
         self.calibrated = True
 
     def set_slope(self, slope: float) -> None:

@@ -23,8 +23,8 @@ class AttackerScore:
         mean_undetected_error: mean of the final error where there was no alarm, and zero where there was, m.
         interval: its 95 % interval, m.
         detection_probability: share of games with an alarm.
-        median_time_to_detect: time by which half of all games had an alarm, s; None if fewer had one (censored by the
-            end).
+        median_time_to_detect: time after the onset by which half of all games had an alarm, s; None if fewer had one
+            (censored by the end).
         error_at_detection: mean error of the estimate at the first alarm, m; None if there was none.
     """
 
@@ -52,7 +52,7 @@ def median_time_to_detect(episodes: Episodes) -> float | None:
     """Kaplan-Meier median, s: undetected games are censored at the end, so it is when half of all have alarmed."""
     n = len(episodes.alarm_epoch)
     needed = (n + 1) // 2
-    times = np.sort(episodes.alarm_epoch[episodes.detected])
+    times = np.sort((episodes.alarm_epoch - episodes.onset_epoch)[episodes.detected])
     return float(times[needed - 1]) * episodes.interval if len(times) >= needed else None
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
@@ -24,16 +24,20 @@ NEVER = -1
 class Episodes:
     """What came of n games in which every fix was used.
 
+    Alarms before the attack are false ones and do not count; where there is no attack all do.
+
     Attributes:
         alarm_epoch: of the first alarm, (n,); -1 = never.
         alarm_error: horizontal error of the estimate at the first alarm, (n,), m; of no meaning where there was none.
         final_error: horizontal error after the last fix was used, (n,), m.
+        onset_epoch: the last one before the attack, (n,); 0 where there is none.
         interval: between epochs, s.
     """
 
     alarm_epoch: Runs
     alarm_error: Floats
     final_error: Floats
+    onset_epoch: Runs
     interval: float
 
     @property
@@ -49,8 +53,9 @@ class WatchedEpisodes:
     Attributes:
         alarm_epoch: of each detector's first alarm, (D, n); -1 = never.
         alarm_error: horizontal error of the estimate then, (D, n), m; of no meaning where there was none.
-        peak: highest statistic over its threshold in epochs 1..K, (D, n).
+        peak: highest statistic over its threshold from the attack on, (D, n); in epochs 1..K where there is none.
         final_error: horizontal error after the last fix was used, (n,), m.
+        onset_epoch: the last one before the attack, (n,); 0 where there is none.
         interval: between epochs, s.
     """
 
@@ -58,22 +63,23 @@ class WatchedEpisodes:
     alarm_error: Floats
     peak: Floats
     final_error: Floats
+    onset_epoch: Runs
     interval: float
 
     def of(self, detector: int) -> Episodes:
         """As one detector, by its place, saw them."""
-        return Episodes(self.alarm_epoch[detector], self.alarm_error[detector], self.final_error, self.interval)
+        alarm_epoch, alarm_error = self.alarm_epoch[detector], self.alarm_error[detector]
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.interval)
 
     def together(self) -> Episodes:
         """As all detectors at once: the first alarm of any."""
         n = len(self.final_error)
         if not len(self.alarm_epoch):
-            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.interval)
+            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.onset_epoch, self.interval)
         epoch = np.where(self.alarm_epoch == NEVER, np.iinfo(np.int64).max, self.alarm_epoch)
         first, runs = epoch.argmin(axis=0), np.arange(n)
-        return Episodes(
-            self.alarm_epoch[first, runs], self.alarm_error[first, runs], self.final_error, self.interval
-        )
+        alarm_epoch, alarm_error = self.alarm_epoch[first, runs], self.alarm_error[first, runs]
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.interval)
 
 
 def horizontal(error: Floats) -> Floats:
@@ -89,27 +95,60 @@ def _batches(episodes: int) -> Iterator[tuple[int, int]]:
         yield first, min(BATCH, episodes - first)
 
 
-def _watch(simulation: Simulation, advance: Callable[[], object]) -> tuple[Runs, Floats, Floats]:
+class _Watch:
+    """First alarms, the errors then, and the highest statistic over its threshold, of each detector and run, (D, n)."""
+
+    def __init__(self, detectors: int, runs: int) -> None:
+        self.alarm_epoch = np.full((detectors, runs), NEVER)
+        self.alarm_error = np.zeros((detectors, runs))
+        self.peak = np.full((detectors, runs), -np.inf)
+
+    def see(self, place: int, epoch: int, ratio: Floats, error: Floats, runs: Flags) -> None:
+        """Take one detector's epoch: its statistic over its threshold and the errors, (n,), where ``runs`` says so."""
+        peak = np.where(runs, ratio, -np.inf)
+        np.maximum(self.peak[place], peak, out=self.peak[place])
+        fresh = (peak > 1.0) & (self.alarm_epoch[place] == NEVER)
+        self.alarm_epoch[place, fresh] = epoch
+        self.alarm_error[place, fresh] = error[fresh]
+
+    def put(self, other: _Watch, runs: Flags) -> None:
+        """Take from another watch what it saw of runs, (n,)."""
+        for mine, theirs in (
+            (self.alarm_epoch, other.alarm_epoch),
+            (self.alarm_error, other.alarm_error),
+            (self.peak, other.peak),
+        ):
+            mine[:, runs] = theirs[:, runs]
+
+
+def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch, Runs]:
     """Play to the last epoch; ``advance`` resolves the present epoch and observes the next.
 
     Returns:
-        Epoch of the first alarm of each detector, the error then, and the highest statistic over its threshold, (D, n)
-        each.
+        What was seen, from the attack on where there is one, and the last epoch before it, (n,).
     """
-    detectors = simulation.detectors
-    shape = len(detectors), simulation.num_runs
-    alarm_epoch, alarm_error, peak = np.full(shape, NEVER), np.zeros(shape), np.full(shape, -np.inf)
+    detectors, n = simulation.detectors, simulation.num_runs
+    everything, attacked = (_Watch(len(detectors), n) for _ in range(2))
+    begun, always = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
+    onset_epoch = np.zeros(n, dtype=np.int64)
     for epoch in range(1, simulation.scenario.timeline.num_epochs + 1):
         advance()
+        begins = ~begun & simulation.offset.any(axis=1)
+        onset_epoch[begins] = epoch - 1
+        begun |= begins
         error = horizontal(simulation.error)
         for place, (name, detector) in enumerate(detectors.items()):
             assert detector.threshold is not None
-            statistic = simulation.epoch.statistics[name]
-            np.maximum(peak[place], statistic / detector.threshold, out=peak[place])
-            fresh = (statistic > detector.threshold) & (alarm_epoch[place] == NEVER)
-            alarm_epoch[place, fresh] = epoch
-            alarm_error[place, fresh] = error[fresh]
-    return alarm_epoch, alarm_error, peak
+            ratio = simulation.epoch.statistics[name] / detector.threshold
+            everything.see(place, epoch, ratio, error, always)
+            attacked.see(place, epoch, ratio, error, begun)
+    everything.put(attacked, begun)
+    return everything, onset_epoch
+
+
+def _watched(simulation: Simulation, watch: _Watch, onset_epoch: Runs, final_error: Floats) -> WatchedEpisodes:
+    interval = simulation.scenario.timeline.interval
+    return WatchedEpisodes(watch.alarm_epoch, watch.alarm_error, watch.peak, final_error, onset_epoch, interval)
 
 
 def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
@@ -118,6 +157,7 @@ def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
         np.concatenate([part.alarm_error for part in parts], axis=1),
         np.concatenate([part.peak for part in parts], axis=1),
         np.concatenate([part.final_error for part in parts]),
+        np.concatenate([part.onset_epoch for part in parts]),
         parts[0].interval,
     )
 
@@ -148,9 +188,9 @@ def watch_attack(
             simulation.resolve()
             simulation.observe()
 
-        watched = _watch(simulation, advance)
+        watch, onset_epoch = _play(simulation, advance)
         simulation.resolve()
-        parts.append(WatchedEpisodes(*watched, horizontal(simulation.error), scenario.timeline.interval))
+        parts.append(_watched(simulation, watch, onset_epoch, horizontal(simulation.error)))
     return _join(parts)
 
 
@@ -193,8 +233,8 @@ def watch_policy(
         def advance(game: SpooferGame = game) -> None:
             game.step(act(game.observation()))
 
-        watched = _watch(game.simulation, advance)
-        parts.append(WatchedEpisodes(*watched, game.error.copy(), game.scenario.timeline.interval))
+        watch, onset_epoch = _play(game.simulation, advance)
+        parts.append(_watched(game.simulation, watch, onset_epoch, game.error.copy()))
     return _join(parts)
 
 

@@ -6,6 +6,7 @@ from scipy import stats
 
 from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.matrix import detection_curve, detection_curves, exact_interval, matrix_report, matrix_rows
 from spoofgym.evaluation.metrics import attacker_score
 from spoofgym.evaluation.monte_carlo import NEVER, play_attack, watch_attack
@@ -47,6 +48,27 @@ def test_together_the_first_alarm_of_any_counts(games):
 def test_a_peak_above_one_is_an_alarm(games):
     watched = games[2]
     np.testing.assert_array_equal(watched.peak > 1.0, watched.alarm_epoch != NEVER)
+
+
+class Counting(Detector):
+    """Its statistic is the epoch, so that it alarms from the first one on."""
+
+    name, threshold = "counting", 0.5
+
+    def update(self, epoch):
+        return epoch.index.astype(float)
+
+
+def test_delay_counts_from_the_onset_and_alarms_before_it_do_not_count():
+    scenario = make_scenario(SCENARIO)
+    late = watch_attack(scenario, make_attack("ramp:5,onset=812"), [Counting()], 10, 0)
+    assert set(late.onset_epoch) == {12}
+    assert set(late.alarm_epoch[0]) == {13}
+    assert attacker_score(late.of(0)).median_time_to_detect == 1.0
+    clean = watch_attack(scenario, make_attack("none"), [Counting()], 10, 0)
+    assert set(clean.onset_epoch) == {0}
+    assert set(clean.alarm_epoch[0]) == {1}
+    assert late.peak[0, 0] == clean.peak[0, 0] == 60.0
 
 
 def test_rows_have_the_figures_of_each_detector(games):

@@ -16,7 +16,8 @@ from spoofgym.scenarios import make_scenario
 
 def episodes(alarm_epoch, interval=1.0):
     alarm_epoch = np.array(alarm_epoch)
-    return Episodes(alarm_epoch, np.full(len(alarm_epoch), 3.0), np.arange(len(alarm_epoch), dtype=float), interval)
+    n = len(alarm_epoch)
+    return Episodes(alarm_epoch, np.full(n, 3.0), np.arange(n, dtype=float), np.zeros(n, dtype=int), interval)
 
 
 def test_a_detected_game_counts_zero():

@@ -32,7 +32,8 @@ from spoofgym.simulation import Simulation
 PAPER = "shadmehri-2025"
 TITLE = "Shadmehri and Mahboobi Esfanjani 2025, spoofing detection by a self-tuning Kalman filter"
 ONSET, END, WARM = 20.0, 25.0, 10.0
-WINDOW = 50
+WINDOW = 5.0
+"""s."""
 NOMINAL = 1e-5
 MATCHED = 0.01
 """Share of clean stretches as long as the attack in which there is an alarm."""
@@ -49,8 +50,8 @@ READINGS = (
     "The noise of the GNSS is not printed: white with the filter's own R (3.7, 3.7, 6 m), and beside it first-order "
     "Gauss-Markov of 1.6, 1.6, 3 m that keeps 0.999 from one 10 Hz fix to the next.",
     "Updates at 10 Hz, the rate of the receiver, and at 160 Hz, the rate of the IMU.",
-    f"The window w and N are not printed: w = {WINDOW} fixes; N = 1, the only one for which 25.9 is the quantile of "
-    "chi-square with 3 degrees of freedom at 1e-5.",
+    f"The window w and N are not printed: w holds {WINDOW:g} s of fixes, 50 at 10 Hz and 800 at 160 Hz; N = 1, the only "
+    "one for which 25.9 is the quantile of chi-square with 3 degrees of freedom at 1e-5.",
     "The test uses S with the R of the epoch before; Q is kept where alpha is not positive, where the published "
     "recursion ends in a number that is none.",
     "Latency is the median of all runs, never where fewer than half of them detect between 20 and 25 s; a ramp of r "
@@ -79,7 +80,12 @@ class Setup:
     def scenario(self) -> str:
         """Its specification."""
         text = f"shadmehri-flight:rate={self.rate},noise={self.noise}"
-        return text if self.filter == COMMON else f"{text},filter=self-tuning,window={WINDOW},guard=hold"
+        return text if self.filter == COMMON else f"{text},filter=self-tuning,window={self.window},guard=hold"
+
+    @property
+    def window(self) -> int:
+        """w, fixes."""
+        return round(WINDOW * self.rate)
 
     @property
     def words(self) -> str:
@@ -242,7 +248,8 @@ def recursion(runs: int, seed: int) -> Listing:
 
 
 def _ends(noise: str, seed: int) -> bool:
-    scenario = f"shadmehri-flight:noise={noise},filter=self-tuning,window={WINDOW},guard=none"
+    window = Setup(SELF_TUNING, noise, 10).window
+    scenario = f"shadmehri-flight:noise={noise},filter=self-tuning,window={window},guard=none"
     simulation = Simulation(make_scenario(scenario), None, (), None, 1, seed)
     try:
         simulation.reset()
