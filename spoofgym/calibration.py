@@ -241,7 +241,8 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
 
 
 def _with_members(detector: Detector, scenario: Scenario, fidelity: str) -> Detector:
-    if not detector.members or (detector.calibrated and detector.origin in (None, calibration_cache.identity(scenario))):
+    here = detector.origin in (None, calibration_cache.identity(scenario))
+    if not detector.members or (detector.calibrated and here):
         return detector
     ready = copy.copy(detector)
     ready.members = calibrated_all(detector.members, scenario, fidelity)

@@ -69,7 +69,7 @@ class Simulation:
 
         Raises:
             ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the
-                game, or a part that needs what the scenario does not give.
+                game, or a part that needs what the scenario does not give (a linear model, a fix with velocity).
         """
         if num_runs < 1:
             raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
@@ -81,11 +81,7 @@ class Simulation:
         self._bind_detectors()
         self.attack = attack
         if attack is not None:
-            attack.bind(scenario.timeline, num_runs)
-            attack.follow(scenario.velocity())
-            if attack.needs_model:
-                scenario.facts.require(f"attack {attack.name!r}", (LINEAR_MODEL,))
-                attack.study(scenario.linear_model())
+            self._bind_attack(attack)
         self.response = response
         if response is not None:
             response.bind(num_runs)
@@ -111,6 +107,18 @@ class Simulation:
         self.offset = self._no_offset.copy()
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
+
+    def _bind_attack(self, attack: Attack) -> None:
+        if attack.needs_velocity and self.scenario.dimension != 6:
+            raise ValueError(
+                f"attack {attack.name!r} needs fixes with velocity (m = 6), scenario {self.scenario.name!r} has fixes "
+                f"of position alone (m = {self.scenario.dimension})"
+            )
+        attack.bind(self.scenario.timeline, self.num_runs)
+        attack.follow(self.scenario.velocity())
+        if attack.needs_model:
+            self.scenario.facts.require(f"attack {attack.name!r}", (LINEAR_MODEL,))
+            attack.study(self.scenario.linear_model())
 
     def _bind_detectors(self) -> None:
         for detector in self.detectors.values():
@@ -298,12 +306,14 @@ class Simulation:
             raise RuntimeError(f"run {int(navigator.index.argmax())} has reached its last epoch: reset it")
         following = navigator.index + 1
         clock = Clock(following - self.burn_in, self._times[following])
+        attack = self.attack if offset is None else None
         if offset is None:
-            offset = self._no_offset if self.attack is None else self.attack.offset(clock)
+            offset = self._no_offset if attack is None else attack.offset(clock)
         deviation = self._noise[self._all, following]
         deviation[:, :3] += offset
         if self.scenario.dimension == 6:
-            deviation[:, 3:] += (offset - self.offset) / self._intervals[following, None]
+            rate = (offset - self.offset) / self._intervals[following, None]
+            deviation[:, 3:] += rate if attack is None else attack.velocity(clock, rate)
         self.offset = np.array(offset, dtype=np.float64)
         navigator.propagate()
         innovation = navigator.innovate(deviation)

@@ -137,7 +137,9 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
     unknown = [key for key in arguments if key not in parameters]
     if unknown:
         valid = ", ".join(parameters) or "none"
-        raise ValueError(f"{kind} {specification.name!r} has no option {unknown[0]!r}; valid options: {valid}")
+        nested = specification.value is not None and ":" in specification.value
+        hint = "; for an option of the part within, write '/' in place of ','" if nested else ""
+        raise ValueError(f"{kind} {specification.name!r} has no option {unknown[0]!r}; valid options: {valid}{hint}")
     missing = [p.name for p in parameters.values() if p.default is inspect.Parameter.empty and p.name not in arguments]
     if missing:
         example = f"{specification.name}:{missing[0]}=..."

@@ -88,6 +88,8 @@ def test_build_converts_by_annotation():
     [
         ("nothing", "unknown part 'nothing'; valid names: bare, function, part"),
         ("part:1,colour=red", "no option 'colour'; valid options: size, count, flag, label, limit"),
+        ("function:part:1,count=2", "valid options: path, grade; for an option of the part within, write '/' in place"),
+        ("function:part,count=2", "valid options: path, grade$"),
         ("part", "needs 'size'"),
         ("part:1,size=2", "'size' is given twice"),
         ("part:one", "size must be float, got 'one'"),

@@ -36,7 +36,7 @@ from train.arguments import above_one, count, picture, seed_number
 from train.attackers import Evaluation
 from train.defenders import POPULATIONS, evaluate_defenders
 from train.defenders_presentation import defenders_figure, defenders_tables
-from train.matrix import Matrix
+from train.matrix import ATTACKS, Matrix
 from train.matrix_presentation import curves_figure, matrix_figure, matrix_tables
 from train.presentation import attackers_figure, attackers_table, recorded_table
 
@@ -44,6 +44,7 @@ EPISODES = {"linear": 20_000, "strapdown": 1_000}
 DEFENDER_EPISODES = 4_000
 MATRIX_EPISODES = {"linear": 4_000, "strapdown": 500}
 MATRIX_ARL0 = 1e4
+ROC_ATTACK = "ramp:0.1"
 TABLES = {
     "attackers": attackers_table,
     "recorded": recorded_table,
@@ -62,7 +63,8 @@ def parser() -> argparse.ArgumentParser:
     )
     add = result.add_argument
     add("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
-    add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
+    add("--detector", action="append",
+        help="the monitor; repeat it for several at once (default: snapshot; with --matrix every family)")
     add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
     add("--shadow", metavar="SPEC",
         help="scenario whose filter every attacker takes for the victim's, in place of the one it was trained with")
@@ -74,8 +76,11 @@ def parser() -> argparse.ArgumentParser:
         help="every --detector against every --attack and --attacker at an equal false-alarm rate (default: all)")
     add("--arl0", type=above_one, help="of the matrix, epochs between false alarms (default: 10000)")
     add("--roc", type=picture, metavar="FILE", help="with --matrix: draw ROC and DET curves of one attack")
-    add("--roc-attack", default="ramp:0.1", help="which attack of the matrix that is (default: %(default)s)")
-    add("--attack", action="append", default=[], help="a scripted attack, e.g. ramp:0.5; repeatable")
+    add("--roc-attack", metavar="SPEC",
+        help=f"which attack of the matrix that is (default: {ROC_ATTACK}, or the first where it is not in the matrix)")
+    add("--attack", action="append", default=[], metavar="SPEC",
+        help="a scripted attack, e.g. ramp:0.5; repeatable (default with --matrix: "
+        f"{len(ATTACKS)} scripted ones and the optimal ones that fit; with a recorded log: ramp:0.5)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
     add("--episodes", type=count,
         help="games of each player (default: 20000 linear, 1000 strapdown; defenders and matrix 4000)")
@@ -91,19 +96,16 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     console = Console(stderr=options.json == "-")
     try:
-        report = _report(options, console)
-    except (ValueError, FileNotFoundError) as error:
+        _show(_report(options, console), options, console)
+    except (ValueError, ArithmeticError, FileNotFoundError) as error:
         Console(stderr=True).print(f"error: {error}", style="red", markup=False)
         return 2
+    return 0
+
+
+def _show(report: dict[str, Any], options: argparse.Namespace, console: Console) -> None:
+    """The table, then JSON and figures where they are asked for."""
     console.print(TABLES[report["kind"]](report))
-    if options.figure is not None:
-        options.figure.parent.mkdir(parents=True, exist_ok=True)
-        FIGURES[report["kind"]](report, options.figure)
-        console.print(f"figure in {options.figure}", markup=False)
-    if options.roc is not None:
-        options.roc.parent.mkdir(parents=True, exist_ok=True)
-        curves_figure(report, options.roc_attack, options.roc)
-        console.print(f"curves in {options.roc}", markup=False)
     if options.json == "-":
         print(json.dumps(report, allow_nan=False))
     elif options.json is not None:
@@ -111,7 +113,24 @@ def main(arguments: list[str] | None = None) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
         console.print(f"rows in {path}", markup=False)
-    return 0
+    if options.figure is not None:
+        options.figure.parent.mkdir(parents=True, exist_ok=True)
+        FIGURES[report["kind"]](report, options.figure)
+        console.print(f"figure in {options.figure}", markup=False)
+    if options.roc is not None:
+        options.roc.parent.mkdir(parents=True, exist_ok=True)
+        attacks = list(dict.fromkeys(curve["attack"] for curve in report["curves"]))
+        curves_figure(report, _roc_attack(options.roc_attack, attacks), options.roc)
+        console.print(f"curves in {options.roc}", markup=False)
+
+
+def _roc_attack(asked: str | None, attacks: list[str]) -> str:
+    """The attack whose curves are drawn: the one asked for, else the usual one or the first of the matrix."""
+    if asked is None:
+        return ROC_ATTACK if ROC_ATTACK in attacks else attacks[0]
+    if asked not in attacks:
+        raise ValueError(f"--roc-attack {asked!r} is not in the matrix; there are: {', '.join(attacks)}")
+    return asked
 
 
 def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
@@ -164,11 +183,8 @@ def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, cons
         options.seed,
         options.threads,
     )
-    if options.roc is not None and options.roc_attack not in matrix.names(options.attack, policies):
-        raise ValueError(
-            f"--roc-attack {options.roc_attack!r} is not in the matrix; there are: "
-            f"{', '.join(matrix.names(options.attack, policies))}"
-        )
+    if options.roc is not None:
+        _roc_attack(options.roc_attack, matrix.names(options.attack, policies))
     return matrix.report(options.detector or (), options.attack, policies, console)
 
 

@@ -20,10 +20,16 @@ from spoofgym.arrays import Floats
 ENSEMBLE = "ensemble"
 COLUMNS = 12
 """Attacks side by side on the terminal."""
+CELL = (0.40, 0.27)
+"""Width and height of a cell of the heat maps, inches: three digits of 9 pt, which a page shows at 8 to 11 pixels."""
 CURVES_DRAWN = 6
+LEAST_ALARMS = 10
+"""Clean games with an alarm that a point must stand on to be drawn: its share is then known within a factor of 2."""
+LUMA = np.array([0.299, 0.587, 0.114])
+"""Share of red, green and blue in the brightness of a colour (ITU-R BT.601)."""
 GREY = "#c8c8c8"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-DET_TICKS = (0.001, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999)
+DET_TICKS = (0.001, 0.005, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999)
 
 
 def short_names(report: dict[str, Any]) -> dict[str, str]:
@@ -103,17 +109,24 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
     names = short_names(report)
     detectors, attacks, detected = values(report, "detection_probability")
     _, _, error = values(report, "mean_undetected_error_m")
-    width, height = 3.6 + 0.52 * len(attacks), 2.2 + 0.34 * len(detectors)
-    figure = Figure(figsize=(width, 2 * height), dpi=110, layout="constrained")
+    width, height = 1.9 + CELL[0] * len(attacks), 2.4 + CELL[1] * len(detectors)
+    figure = Figure(figsize=(width, 2 * height), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1)
     labels = [names[name] for name in detectors]
     _heat(above, labels, attacks, detected, 100.0 * detected, "Blues", 1.0)
     above.set_title(
-        f"{report['scenario']}: games with an alarm, %, at ARL₀ = {report['arl0']:g} epochs", loc="left", fontsize=11
+        f"{report['scenario']}: games with an alarm, %, at ARL₀ = {report['arl0']:g} epochs\n"
+        "(none: clean games, false alarms)",
+        loc="left",
+        fontsize=11,
     )
     _heat(below, labels, attacks, np.log10(np.maximum(error, 0.1)), error, "Oranges", None)
-    below.set_title("mean undetected error, m (0 where an alarm came)", loc="left", fontsize=11)
+    below.set_title(
+        "mean undetected error, m, 0 where an alarm came\n(none: the clean error of navigation)",
+        loc="left",
+        fontsize=11,
+    )
     figure.supxlabel("\n".join(ensemble_notes(report)), fontsize=8, ha="left", x=0.01)
     figure.savefig(path)
 
@@ -125,14 +138,17 @@ def _heat(
     top = most if most is not None else max(float(np.nanmax(colour)), 1.0)
     bottom = 0.0 if most is not None else -1.0
     axes.imshow(colour, cmap=colormaps[palette], vmin=bottom, vmax=top, aspect="auto")
+    brightness = colormaps[palette]((colour - bottom) / (top - bottom))[..., :3] @ LUMA
     for i, j in np.ndindex(text.shape):
         if np.isfinite(text[i, j]):
-            dark = (colour[i, j] - bottom) > 0.6 * (top - bottom)
-            ink = "white" if dark else "black"
-            axes.text(j, i, _figure(float(text[i, j])), ha="center", va="center", fontsize=7.5, color=ink)
-    axes.set_xticks(range(len(columns)), columns, rotation=40, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.set_yticks(range(len(rows)), rows, fontsize=8)
-    axes.tick_params(length=0)
+            ink = "white" if brightness[i, j] < 0.45 else "black"
+            axes.text(j, i, _figure(float(text[i, j])), ha="center", va="center", fontsize=9, color=ink)
+    axes.set_xticks(range(len(columns)), columns, rotation=50, ha="right", rotation_mode="anchor", fontsize=9)
+    axes.set_yticks(range(len(rows)), rows, fontsize=9)
+    axes.set_xticks(np.arange(0.5, len(columns) - 1), minor=True)
+    axes.set_yticks(np.arange(0.5, len(rows) - 1), minor=True)
+    axes.grid(which="minor", color="white", linewidth=0.8)
+    axes.tick_params(which="both", length=0)
     for side in axes.spines.values():
         side.set_visible(False)
 
@@ -142,16 +158,36 @@ def _figure(value: float) -> str:
     return f"{value:.0f}" if value >= 9.95 or value == 0.0 else f"{value:.1f}"
 
 
+def drawn_curves(report: dict[str, Any], attack: str) -> list[dict[str, Any]]:
+    """The curves of an attack, of the points that `LEAST_ALARMS` clean games or more stand behind.
+
+    Raises:
+        ValueError: the report has no curves of this attack, or none with such a point.
+    """
+    names = list(dict.fromkeys(curve["attack"] for curve in report["curves"]))
+    if attack not in names:
+        raise ValueError(f"no curves of attack {attack!r}; there are: {', '.join(names)}")
+    least = (LEAST_ALARMS - 0.5) / report["episodes"]
+    curves = []
+    for curve in report["curves"]:
+        points = [point for point in curve["points"] if point["false_alarm_probability"] > least]
+        if curve["attack"] == attack and points:
+            curves.append({**curve, "points": points})
+    if not curves:
+        raise ValueError(
+            f"no curve of attack {attack!r} has a point with {LEAST_ALARMS} clean alarms in {report['episodes']} "
+            "games: raise --episodes"
+        )
+    return curves
+
+
 def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     """ROC and DET of every detector against one attack; the best few with their 95 % intervals, the others in grey.
 
     Raises:
-        ValueError: the report has no curves of this attack.
+        ValueError: the report has no curves of this attack, or none with enough clean alarms.
     """
-    curves = [curve for curve in report["curves"] if curve["attack"] == attack and curve["points"]]
-    if not curves:
-        valid = ", ".join(dict.fromkeys(curve["attack"] for curve in report["curves"]))
-        raise ValueError(f"no curves of attack {attack!r}; there are: {valid}")
+    curves = drawn_curves(report, attack)
     names = short_names(report)
     curves.sort(key=_area, reverse=True)
     coloured = curves[:CURVES_DRAWN]
@@ -173,11 +209,12 @@ def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     ticks = stats.norm.ppf(DET_TICKS)
     det.set_xticks(ticks, [f"{100 * p:g}" for p in DET_TICKS])
     det.set_yticks(ticks, [f"{100 * p:g}" for p in DET_TICKS])
-    det.set_xlim(ticks[0], ticks[4])
+    least = min(point["false_alarm_probability"] for curve in curves for point in curve["points"])
+    det.set_xlim(stats.norm.ppf(least), ticks[DET_TICKS.index(0.5)])
     det.set_ylim(ticks[0], ticks[-1])
     det.set_xlabel("games with a false alarm, %")
     det.set_ylabel("games with the attack missed, %")
-    det.set_title("DET; bands: 95 % intervals", loc="left", fontsize=11)
+    det.set_title("DET; bands and bars: 95 % intervals", loc="left", fontsize=11)
     for axes in (roc, det):
         axes.grid(color="#e6e6e6", linewidth=0.6)
     figure.savefig(path)
@@ -198,6 +235,9 @@ def _draw(roc: Axes, det: Axes, curve: dict[str, Any], colour: str, label: str |
     x, missed = stats.norm.ppf(false_alarm), stats.norm.ppf(np.clip(1.0 - found, edge, 1.0 - edge))
     det.plot(x, missed, color=colour, linewidth=1.4 if label else 0.8, zorder=order)
     if label:
+        bars = np.array([point["false_alarm_ci95"] for point in points]).T
+        roc.hlines(found, *bars, color=colour, alpha=0.4, linewidth=0.8, zorder=order)
+        det.hlines(missed, *stats.norm.ppf(bars), color=colour, alpha=0.4, linewidth=0.8, zorder=order)
         roc.fill_between(false_alarm, low, high, color=colour, alpha=0.15, linewidth=0, zorder=order)
         bounds = [stats.norm.ppf(np.clip(1.0 - bound, edge, 1.0 - edge)) for bound in (high, low)]
         det.fill_between(x, bounds[0], bounds[1], color=colour, alpha=0.15, linewidth=0, zorder=order)

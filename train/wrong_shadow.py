@@ -29,6 +29,8 @@ from agents.scripted import OffsetSequence
 from spoofgym.arrays import Floats
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.detectors.chi_square import Snapshot
 from spoofgym.envs.shadow import shadow_model
 from spoofgym.evaluation.metrics import NORMAL_95, attacker_score, undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes
@@ -97,6 +99,21 @@ def _with(scenario: Scenario, **options: object) -> str:
     parsed = Specification.parse(scenario.name)
     changed = Specification.parse(spell(parsed.name, **options)).options
     return make_scenario(str(replace(parsed, options={**parsed.options, **changed}))).name
+
+
+def check_trained_against_snapshot(policy: LearnedSpoofer) -> None:
+    """Refuse a policy that another detector has taught to do something else.
+
+    Raises:
+        ValueError: telling what it was trained against.
+    """
+    given = policy.config.detector
+    trained = [make_detector(item) for item in ((given,) if isinstance(given, str | Detector) else given)]
+    if len(trained) != 1 or not isinstance(trained[0], Snapshot):
+        raise ValueError(
+            f"policy {policy.name!r} was trained against {', '.join(detector.name for detector in trained)}; what a "
+            "wrong shadow filter costs is told for policies that were trained against a snapshot test"
+        )
 
 
 def policy_player(evaluation: Evaluation, policy: LearnedSpoofer) -> Player:
@@ -257,6 +274,7 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     for policy in policies:
         if policy.config.knowledge == "blind":
             raise ValueError(f"policy {policy.name!r} is blind: it has no shadow filter that could be wrong")
+        check_trained_against_snapshot(policy)
     evaluation.check_layouts(policies)
     players = [(policy.name, policy_player(evaluation, policy)) for policy in policies]
     players.append(("optimum", optimum_player(evaluation, threshold)))

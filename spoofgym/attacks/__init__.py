@@ -22,6 +22,7 @@ from spoofgym.attacks.fusion_ripper import FusionRipper
 from spoofgym.attacks.meaconing import Meaconing
 from spoofgym.attacks.noise_matched import NoiseMatched
 from spoofgym.attacks.pool import POPULATIONS, AttackPool
+from spoofgym.attacks.position_only import PositionOnly
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
 from spoofgym.attacks.song_mix import SongMix
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
@@ -31,6 +32,11 @@ from spoofgym.specification import Specification, build, unnest
 def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0) -> TrackingError:
     """The tracking error around an attack that is spelled with ``/`` in place of its commas."""
     return TrackingError(make_attack(unnest(attack)), sigma, time)
+
+
+def _position_only(attack: str) -> PositionOnly:
+    """The attack spelled with ``/`` in place of its commas, with a velocity that stays true."""
+    return PositionOnly(make_attack(unnest(attack)))
 
 
 ATTACKS: dict[str, Callable[..., Attack]] = {
@@ -56,6 +62,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "climbing-spiral": ClimbingSpiral,
     **POPULATIONS,
     "tracking-error": _tracking_error,
+    "position-only": _position_only,
 }
 
 

@@ -21,10 +21,12 @@ class Attack(ABC):
         onset: scenario time from which the offset grows, s; None = the start of the game (its epoch 0, the last clean
             one).
         needs_model: whether it must `study` the victim's filter.
+        needs_velocity: whether the receiver must give velocity, too.
     """
 
     onset: float | None = None
     needs_model: bool = False
+    needs_velocity: bool = False
 
     @property
     @abstractmethod
@@ -76,6 +78,15 @@ class Attack(ABC):
     def active(self, clock: Clock) -> Flags:
         """Whether the receiver follows the spoofer at the epoch, (N,), though the offset be zero."""
         return self.started(clock)
+
+    def velocity(self, clock: Clock, rate: Floats) -> Floats:
+        """What is added to the velocity of the fix, where the receiver gives one, (N, 3), m/s ENU.
+
+        Args:
+            clock: of the epoch.
+            rate: of the offset, since the epoch before, (N, 3), m/s ENU: what a consistent spoofer adds.
+        """
+        return rate
 
     @abstractmethod
     def offset(self, clock: Clock) -> Floats:

@@ -1,4 +1,4 @@
-"""Meaconing: the receiver is shown where the vehicle was some seconds ago."""
+"""Meaconing by delay: the receiver is shown where the vehicle itself was some seconds ago."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ def path(velocity: Floats, timeline: Timeline, time: Floats) -> Floats:
 
 
 class Meaconing(FixedOffsets):
-    """The fixes of ``delay`` seconds ago, which the spoofer recorded and replays: s(t) = p(t - delay) - p(t).
+    """What the vehicle itself received ``delay`` seconds ago, recorded and replayed: s(t) = p(t - delay) - p(t).
 
     All three axes are shifted, backward along the vehicle's own track, by the distance that it goes in the delay: an
-    attack without any knowledge of receiver or filter. The clock error that a replay brings, too, is not part of a
-    fix. The track is the integral of the true velocity at the epochs; before the game it goes on straight backward.
+    attack without any knowledge of receiver or filter. A meaconer with a fixed antenna is another attack: it would show
+    the receiver the position of that antenna. The clock error that a replay brings, too, is not part of a fix. The
+    track is the integral of the true velocity at the epochs; before the game it goes on straight backward.
 
     Args:
         delay: s.

@@ -55,6 +55,7 @@ class AttackPool(Attack):
         self.clean = validation.share("pool of attacks", "clean", clean)
         self._members = [member for member, _ in members]
         self.needs_model = any(member.needs_model for member in self._members)
+        self.needs_velocity = any(member.needs_velocity for member in self._members)
         self.names = tuple(member.name for member in self._members)
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"each attack can be in a pool once only, got {', '.join(self.names)}")
@@ -111,6 +112,14 @@ class AttackPool(Attack):
     def offset(self, clock: Clock) -> Floats:
         """This epoch's offset, (N, 3), m ENU."""
         return self.offsets[self._runs, np.maximum(clock.index, 0)]
+
+    def velocity(self, clock: Clock, rate: Floats) -> Floats:
+        """What each run's opponent adds to the velocity of the fix, (N, 3), m/s ENU."""
+        added = rate
+        for place, attack in enumerate(self._members):
+            if attack.needs_velocity:
+                added = np.where((self.member == place)[:, None], attack.velocity(clock, rate), added)
+        return added
 
 
 def training_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT_MANOEUVRE) -> AttackPool:

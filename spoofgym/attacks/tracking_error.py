@@ -40,6 +40,7 @@ class TrackingError(Attack):
         self.time = validation.non_negative("tracking-error", "time", time)
         self.onset = attack.onset
         self.needs_model = attack.needs_model
+        self.needs_velocity = attack.needs_velocity
 
     @property
     def name(self) -> str:
@@ -82,3 +83,7 @@ class TrackingError(Attack):
         """The offset of the attack inside, and the error where it is active, (N, 3), m ENU."""
         error = self._errors[self._runs, np.maximum(clock.index, 0)]
         return self.attack.offset(clock) + np.where(self.active(clock)[:, None], error, 0.0)
+
+    def velocity(self, clock: Clock, rate: Floats) -> Floats:
+        """What the attack inside adds to the velocity of the fix at the rate of the whole offset, (N, 3), m/s ENU."""
+        return self.attack.velocity(clock, rate)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -34,13 +35,28 @@ SETS_THRESHOLD = ("threshold", "p_fa", "preset", "arl0", "jump_threshold", "slow
 
 ENSEMBLE = "snapshot+cusum+signed-mean:n=30+signed-cusum+mewma"
 """Members of an ensemble that is named without any."""
+BETWEEN_MEMBERS = re.compile(r"(?<!\d[eE])\+")
+"""The plus between two members, not that of an exponent as in 1e+04."""
 
 
 def _ensemble(members: str = ENSEMBLE, threshold: float | None = None, arl0: float | None = None) -> Ensemble:
     """The ensemble of members spelled ``detector+detector``, each with ``/`` in place of its commas."""
-    names = [unnest(member) for member in members.split("+")]
     asked = Ensemble.default_arl0 if arl0 is None else arl0
-    return Ensemble([make_detector(at_arl0(name, asked)) for name in names], threshold, arl0)
+    return Ensemble([_member(text, asked) for text in BETWEEN_MEMBERS.split(members)], threshold, arl0)
+
+
+def _member(text: str, arl0: float) -> Detector:
+    """A member of an ensemble, to be calibrated to its ARL0 where nothing else decides.
+
+    Raises:
+        ValueError: no detector; the message tells the member and how one is spelled.
+    """
+    try:
+        return make_detector(at_arl0(unnest(text), arl0))
+    except ValueError as error:
+        raise ValueError(
+            f"ensemble: member {text!r}: {error} (within a member '/' stands for ',' and '~' for '+')"
+        ) from error
 
 
 DETECTORS: dict[str, Callable[..., Detector]] = {

@@ -80,9 +80,10 @@ class SignedCusum(ThresholdDetector):
         S±_i = max(0, S±_{i-1} ± w_i − k),      statistic = the largest of both sides of the three axes
 
     Under a matched filter every w is standard normal. Each sum is the sequential likelihood-ratio test against a shift
-    of the mean by 2 k, and the fastest one among those of its ARL0 (Page 1954, Lorden 1971). The whitening factor is
-    lower triangular, so that the first three components are the position whitened by its own covariance; a velocity in
-    the fix is left out, since a drag-off shows in the position first and each axis more costs sensitivity.
+    of the mean by 2 k (Page 1954), and the fastest one to find that shift among the tests of its ARL0 by Lorden's
+    criterion, the worst mean delay (Moustakides 1986). The whitening factor is lower triangular, so that the first
+    three components are the position whitened by its own covariance; a velocity in the fix is left out, since a
+    drag-off shows in the position first and each axis more costs sensitivity.
 
     The axes are those of w and not those of the vehicle: a shift between axes is seen less well than by a test that
     turns with it, at worst as 1/√3 of its length. After an attack S comes down by k per epoch only.

@@ -142,6 +142,7 @@ REQUIRED = {
     "meaconing": ":2",
     "fusion-ripper": ":1",
     "tracking-error": ":ramp:1/direction=0",
+    "position-only": ":ramp:1/direction=0",
 }
 
 

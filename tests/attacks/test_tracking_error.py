@@ -164,6 +164,7 @@ def test_the_onset_is_that_of_the_attack_inside():
     [
         ("tracking-error", "needs 'attack'"),
         ("tracking-error:drift", "unknown attack 'drift'"),
+        ("tracking-error:ramp:0.5,direction=3", "no option 'direction'; valid options: attack, sigma, time; .*'/'"),
         ("tracking-error:ramp:1,sigma=-1", "sigma must be a finite number, 0 or more, got -1.0"),
         ("tracking-error:ramp:1,time=inf", "time must be a finite number, 0 or more, got inf"),
         ("tracking-error:tracking-error:none", "attack must have no tracking error of its own"),

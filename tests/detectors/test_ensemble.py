@@ -236,6 +236,8 @@ def test_it_has_the_memory_and_the_demands_of_its_members():
         ("ensemble:snapshot", r"members must be two or more detectors, all different, got \['snapshot:arl0=100000'\]"),
         ("ensemble:snapshot+snapshot", "members must be two or more detectors, all different"),
         ("ensemble:snapshot+other", "unknown detector 'other'"),
+        ("ensemble:snapshot+windowed:n=x", "member 'windowed:n=x': .*n must be int, .*'/' stands for ',' and '~'"),
+        ("ensemble:snapshot+window-bank:lengths=5+20", "ensemble: member '20': unknown detector '20'.*'~' for"),
         ("ensemble:snapshot+windowed:m=5", "has no option 'm'; valid options: "),
         ("ensemble:snapshot+windowed,threshold=0", "threshold must be a finite number greater than 0, got 0"),
         ("ensemble:snapshot+windowed,threshold=1,arl0=9", "at most one of threshold, arl0"),
@@ -244,6 +246,16 @@ def test_it_has_the_memory_and_the_demands_of_its_members():
 def test_bad_specifications_are_refused(specification, message):
     with pytest.raises(ValueError, match=message):
         make_detector(specification)
+
+
+@pytest.mark.parametrize("number", ["1e+04", "1E+4", "1e4", "10000"])
+def test_the_plus_of_an_exponent_parts_no_members(number):
+    made = make_detector(f"ensemble:snapshot:arl0={number}+windowed:n=5/threshold=45+mewma")
+    assert [member.name for member in made.members] == [
+        "snapshot:arl0=10000",
+        "windowed:n=5,threshold=45",
+        "mewma",
+    ]
 
 
 def test_an_ensemble_within_one_and_a_member_without_a_threshold_are_refused():

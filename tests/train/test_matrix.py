@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from train import evaluate
-from train.matrix_presentation import ensemble_notes, short_names, values
+from train.matrix_presentation import drawn_curves, ensemble_notes, short_names, values
 
 SHORT = ["--matrix", "--scenario", "liu-flight:horizon=20", "--arl0", "300", "--episodes", "200", "--threads", "1"]
 PARTS = ["--detector", "snapshot", "--detector", "mewma", "--detector", "ensemble:snapshot+mewma", "--attack", "ramp:1"]
@@ -65,6 +65,42 @@ def test_figures_are_written_and_the_table_fits_a_terminal(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "games with an alarm" in printed
     assert "mean undetected error" in printed
+
+
+@pytest.mark.parametrize(
+    ("attacks", "drawn"), [(["ramp:1", "jump"], "ramp:1"), (["jump", "ramp:0.1"], "ramp:0.1"), (["jump"], "jump")]
+)
+def test_curves_of_the_usual_attack_or_else_of_the_first(attacks, drawn, tmp_path, monkeypatch):
+    chosen = []
+    monkeypatch.setattr(evaluate, "curves_figure", lambda report, attack, path: chosen.append(attack))
+    parts = [part for attack in attacks for part in ("--attack", attack)]
+    assert evaluate.main([*SHORT, "--detector", "snapshot", *parts, "--roc", str(tmp_path / "roc.png")]) == 0
+    assert chosen == [drawn]
+
+
+def test_points_with_few_clean_alarms_are_not_drawn(report):
+    drawn = drawn_curves(report, "ramp:1")
+    assert [curve["detector"] for curve in drawn] == [item["name"] for item in report["detectors"]]
+    for curve, whole in zip(drawn, report["curves"], strict=True):
+        alarms = [round(200 * point["false_alarm_probability"]) for point in whole["points"]]
+        assert alarms[0] < 10
+        assert curve["points"] == [point for point, n in zip(whole["points"], alarms, strict=True) if n >= 10]
+
+
+def test_curves_need_false_alarms_and_the_rows_are_kept(tmp_path, capsys):
+    few = [*SHORT, *PARTS, "--episodes", "15", "--json", str(tmp_path / "out.json"), "--roc", str(tmp_path / "roc.png")]
+    assert evaluate.main(few) == 2
+    assert "raise --episodes" in " ".join(capsys.readouterr().err.split())
+    assert json.loads((tmp_path / "out.json").read_text())["episodes"] == 15
+
+
+def test_a_filter_that_breaks_down_is_told(capsys):
+    scenario = "shadmehri-flight:filter=self-tuning,noise=markov,guard=none"
+    parts = ["--detector", "snapshot:threshold=1e9", "--attack", "ramp:1", "--episodes", "20", "--threads", "1"]
+    assert evaluate.main(["--matrix", "--scenario", scenario, *parts]) == 2
+    error = " ".join(capsys.readouterr().err.split())
+    assert error.startswith("error: run ")
+    assert "choose a guard" in error
 
 
 @pytest.mark.parametrize(

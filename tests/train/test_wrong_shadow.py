@@ -1,6 +1,7 @@
 """Spoofers whose shadow filter is not the victim's: what they are worth, and the programs that tell."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -124,6 +125,23 @@ def test_program(folder, tmp_path, capsys, monkeypatch):
             assert (row["fraction_of_right"], row["fraction_ci95"]) == (1.0, [1.0, 1.0])
     table = capsys.readouterr().out
     assert all(text in table for text in ("braking", "optimum", "imu tactical", "sigma x 2"))
+
+
+@pytest.mark.parametrize(
+    ("detector", "told"),
+    [
+        ("cusum", "cusum; "),
+        ("ensemble", "ensemble:snapshot"),
+        (["snapshot", "windowed:n=5"], "snapshot, windowed:n=5; "),
+    ],
+)
+def test_a_policy_that_another_detector_has_taught_is_refused(folder, tmp_path, capsys, detector, told):
+    other = tmp_path / "other"
+    shutil.copytree(folder, other)
+    (other / CONFIG_FILE).write_text(json.dumps({"environment": {"scenario": SCENARIO, "detector": detector}}))
+    assert wrong_shadow.main(["--scenario", SCENARIO, "--attacker", str(other)]) == 2
+    message = " ".join(capsys.readouterr().err.split())
+    assert f"policy 'other' was trained against {told}" in message
 
 
 def test_evaluation_replaces_the_shadow(folder, evaluation, capsys):

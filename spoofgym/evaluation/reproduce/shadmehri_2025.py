@@ -50,8 +50,8 @@ READINGS = (
     "The noise of the GNSS is not printed: white with the filter's own R (3.7, 3.7, 6 m), and beside it first-order "
     "Gauss-Markov of 1.6, 1.6, 3 m that keeps 0.999 from one 10 Hz fix to the next.",
     "Updates at 10 Hz, the rate of the receiver, and at 160 Hz, the rate of the IMU.",
-    f"The window w and N are not printed: w holds {WINDOW:g} s of fixes, 50 at 10 Hz and 800 at 160 Hz; N = 1, the only "
-    "one for which 25.9 is the quantile of chi-square with 3 degrees of freedom at 1e-5.",
+    f"The window w and N are not printed: w holds {WINDOW:g} s of fixes, 50 at 10 Hz and 800 at 160 Hz; N = 1, the "
+    "only one for which 25.9 is the quantile of chi-square with 3 degrees of freedom at 1e-5.",
     "The test uses S with the R of the epoch before; Q is kept where alpha is not positive, where the published "
     "recursion ends in a number that is none.",
     "Latency is the median of all runs, never where fewer than half of them detect between 20 and 25 s; a ramp of r "
