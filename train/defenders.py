@@ -37,6 +37,20 @@ LEARNED_MEAN = "mean of the learned"
 """Stands for all learned defenders of a comparison: their mean error in each game."""
 
 
+def fits(detector: str, scenario: Scenario) -> bool:
+    """Whether a scenario offers what the detector of a specification needs."""
+    return set(make_detector(detector).needs) <= set(scenario.offers)
+
+
+def listed_for(scenario: Scenario, listed: Sequence[ClassicalDefender], console: Console) -> list[ClassicalDefender]:
+    """Those of the defenders that are always played whose detectors fit the scenario; the console names the others."""
+    left_out = [item for item in listed if not fits(item.detector, scenario)]
+    if left_out:
+        names = ", ".join(f"{item.name} ({item.detector})" for item in left_out)
+        console.print(f"left out, as scenario {scenario.name} does not give what they need: {names}", markup=False)
+    return [item for item in listed if item not in left_out]
+
+
 def world_of(
     scenario: Scenario,
     attacks: str,
@@ -47,11 +61,14 @@ def world_of(
 ) -> World:
     """The world of an evaluation: half of the games are clean.
 
+    Of `WORLD_DETECTORS` those run that fit the scenario.
+
     Raises:
-        ValueError: a detector cannot be built.
+        ValueError: a detector cannot be built, or one that a policy or a defender watches does not fit the scenario.
     """
+    common = [name for name in WORLD_DETECTORS if fits(name, scenario)]
     wanted = [str(part) for policy in policies for part in policy.config.detectors]
-    names = dict.fromkeys([*WORLD_DETECTORS, *wanted, *(item.detector for item in classical)])
+    names = dict.fromkeys([*common, *wanted, *(item.detector for item in classical)])
     built = {detector.name: detector for detector in map(make_detector, names)}
     detectors = tuple(calibrated_all(list(built.values()), scenario))
     return World(scenario, attacks, 0.5, detectors, fidelity=fidelity, threads=threads)
@@ -96,6 +113,7 @@ class Defenders:
 
     def play(
         self,
+        published: Sequence[ClassicalDefender],
         tuned: Sequence[ClassicalDefender],
         given: Sequence[ClassicalDefender],
         policies: Sequence[LearnedDefender],
@@ -109,7 +127,7 @@ class Defenders:
         }
         for name, play in yardsticks.items():
             yield self._played(name, "yardstick", play)
-        for kind, classical in (("published", PUBLISHED), ("tuned", tuned), ("given", given)):
+        for kind, classical in (("published", published), ("tuned", tuned), ("given", given)):
             for defender in classical:
                 yield self._played(defender.name, kind, partial(self._classical, defender))
         yield self._played("oracle-onset", "yardstick", lambda: play_oracle_onset(world, episodes, seed))
@@ -235,11 +253,14 @@ def evaluate_defenders(
         console: where the progress is shown.
 
     Raises:
-        ValueError: two policies of one name, or one that was trained on another observation.
+        ValueError: two policies of one name, one that was trained on another observation, or one or a given defender
+            whose detector does not fit the scenario.
     """
     names = [policy.name for policy in policies]
     if len(set(names)) < len(names):
         raise ValueError(f"run folders of one name cannot be told apart: {', '.join(names)}")
+    published = listed_for(scenario, PUBLISHED, console)
+    tuned = listed_for(scenario, tuned_for(scenario.name), console)
     kinds: dict[str, str] = {}
     report_rows, pairs, gaps = [], [], []
     for population in populations:
@@ -247,7 +268,7 @@ def evaluate_defenders(
         with console.status("thresholds of the detectors"):
             world = world_of(scenario, population, fidelity, threads, policies, given)
         check_policies(world, policies)
-        played = list(Defenders(world, episodes, seed, console).play(tuned_for(scenario.name), given, policies))
+        played = list(Defenders(world, episodes, seed, console).play(published, tuned, given, policies))
         learned = [item for item in played if item.kind == "learned"]
         for item in played:
             kinds[item.name] = item.kind
