@@ -106,8 +106,8 @@ GRADES = {
             heading_random_walk=0.2,
             scale=0.02,
             slip=0.01,
-            source="a prototype outside this package, in which it was tuned to the 5 m that Song's robot is off at most "
-            "while it leaves GNSS out for 150 s",
+            source="a prototype outside this package, in which it was tuned to the 5 m that Song's robot is off at "
+            "most while it leaves GNSS out for 150 s",
         ),
         OdometerGrade(
             name="table-1",
