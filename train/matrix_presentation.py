@@ -52,6 +52,7 @@ def ensemble_notes(report: dict[str, Any]) -> list[str]:
 
 def _without_arl0(name: str, arl0: float) -> str:
     """The shortest specification that means the same at this ARL₀."""
+    name = name.replace(f":arl0={arl0:g},", ":").replace(f":arl0={arl0:g}/", ":")
     for mark in (f",arl0={arl0:g}", f":arl0={arl0:g}", f"/arl0={arl0:g}"):
         name = name.replace(mark, "")
     return name
