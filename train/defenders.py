@@ -47,7 +47,8 @@ def listed_for(scenario: Scenario, listed: Sequence[ClassicalDefender], console:
     left_out = [item for item in listed if not fits(item.detector, scenario)]
     if left_out:
         names = ", ".join(f"{item.name} ({item.detector})" for item in left_out)
-        console.print(f"left out, as scenario {scenario.name} does not give what they need: {names}", markup=False)
+        text = f"left out, as scenario {scenario.name} does not give what they need: {names}"
+        console.print(text, markup=False, soft_wrap=True)
     return [item for item in listed if item not in left_out]
 
 

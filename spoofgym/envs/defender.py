@@ -26,6 +26,12 @@ class DefenderEnv(SingleEnv):
     The default scenario is a drive after FOI-R-5687: 230 epochs from 20 s on, 20 m/s, two turns, a fibre-optic IMU.
     Each game draws its opponent from a population of attacks, or has none.
 
+    On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
+    fixes (`docs/robot.md`): without GNSS it runs on by these. Only the horizontal error counts, there as everywhere. A
+    spoofed height does not enter the estimate there; it still shows in tests that look at the height, as `snapshot`
+    does. `relative-motion`, one of the default detectors, needs an inertial solution, which the robot has not: name
+    others.
+
     ```python
     import gymnasium
 
@@ -38,10 +44,10 @@ class DefenderEnv(SingleEnv):
 
     - First: 0 = use the fix of the present epoch, 1 = exclude it. A fix that the receiver does not give is never used.
     - Second: place in the scenario's depth table: (0, 3, 5, 8, 12, 16, 20, 25, 30, 40, 50) epochs on the drive (D =
-      11), (0, 5, 10, 20, 50) elsewhere. It is read only where
-      the last decision was to use and this one is to exclude, and it is the number of epochs before the present one
-      whose fixes are taken back. A backtrack no deeper than the present coast does nothing, for there is no fix to take
-      back; one deeper than the history is cut. Both are told in `info`.
+      11), (0, 2, 5, 10, 20, 30) on the robot, (0, 5, 10, 20, 50) elsewhere. It is read only where the last decision was
+      to use and this one is to exclude, and it is the number of epochs before the present one whose fixes are taken
+      back. A backtrack no deeper than the present coast does nothing, for there is no fix to take back; one deeper than
+      the history is cut. Both are told in `info`.
 
     ## Observation Space
 
@@ -147,7 +153,7 @@ class DefenderEnv(SingleEnv):
     | `clean` | `0.5` | share of games without an attack |
     | `outage` | `0.15` | share of games in which the receiver loses GNSS for 10 to 40 s |
     | `multipath` | `0.15` | share of games with a burst of multipath, 3 to 8 m for 10 to 20 s |
-    | `error_scale` | `None` | metres of error that cost 1; None = the scenario's (10 m drive, 50 m flight) |
+    | `error_scale` | `None` | metres of error that cost 1; None = the scenario's (10 m drive, 50 m flight, 1 m robot) |
     | `error_clip` | `5.0` | largest cost of the error in a step |
     | `exclusion_cost` | `0.05` | of a clean fix left out |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |

@@ -18,6 +18,8 @@ SHARE_OF_TRACK = 0.2
 """Largest deviation in the ground track, as a share of its extent: smaller deviations are magnified up to it."""
 LEAST_DEVIATION = 30.0
 """Deviations are not magnified as if they were smaller than this, m: noise stays small in the drawing."""
+LARGEST_IN_METRES = 1000.0
+"""Frames of the ground track that are wider than this are labelled in km, m."""
 LARGEST_LINEAR = 5.0
 """Statistics over their thresholds are drawn on a logarithmic scale where one exceeds this."""
 ROUND_FACTORS = np.array([1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000])
@@ -93,20 +95,23 @@ class SpooferFigure:
         largest = max(float(np.abs(rows[:, 1:5]).max()), LEAST_DEVIATION)
         place = int(np.searchsorted(ROUND_FACTORS, SHARE_OF_TRACK * extent / largest, side="right"))
         factor = int(ROUND_FACTORS[max(place - 1, 0)])
-        axes.plot(*(whole / 1000.0).T, color="0.8", linewidth=1, linestyle=":", label="true, still to come")
         lines = (
             (np.zeros((len(rows), 2)), "true", TRUE, 1.5),
             (rows[:, 3:5], "told by the spoofed fixes", SPOOFED, 2.0),
             (rows[:, 1:3], "estimated by the filter", ESTIMATED, 2.0),
         )
+        centre = (whole.min(axis=0) + whole.max(axis=0)) / 2.0
+        farthest = max(float(np.abs(whole[: len(rows)] + factor * part - centre).max()) for part, *_ in lines)
+        half = max(0.8 * extent, 1.1 * farthest)
+        unit, metres = ("m", 1.0) if 2.0 * half <= LARGEST_IN_METRES else ("km", 1000.0)
+        axes.plot(*(whole / metres).T, color="0.8", linewidth=1, linestyle=":", label="true, still to come")
         for deviation, label, colour, width in lines:
-            east, north = ((whole[: len(rows)] + factor * deviation) / 1000.0).T
+            east, north = ((whole[: len(rows)] + factor * deviation) / metres).T
             axes.plot(east, north, color=colour, label=label, linewidth=width)
             axes.plot(east[-1], north[-1], "o", color=colour, markersize=6)
-        centre = (whole.min(axis=0) + whole.max(axis=0)) / 2000.0
-        half = 0.8 * extent / 1000.0
-        axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half), aspect="equal")
-        axes.set(xlabel="east, km", ylabel="north, km")
+        (west, south), (east, north) = (centre - half) / metres, (centre + half) / metres
+        axes.set(xlim=(west, east), ylim=(south, north), aspect="equal")
+        axes.set(xlabel=f"east, {unit}", ylabel=f"north, {unit}")
         axes.set_title("Ground track" + (f", deviations × {factor}" if factor > 1 else ""))
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), frameon=False, fontsize=9, ncols=2)
 

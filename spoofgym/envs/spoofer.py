@@ -25,6 +25,9 @@ class SpooferEnv(SingleEnv):
     level at 150 m/s, and a chi-square test of each fix with threshold 25.9. The best score there is known
     (`spoofgym.optimum`), so that a learned policy can be reported as a fraction of it.
 
+    On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
+    fixes (`docs/robot.md`). The robot knows its height, and only the horizontal error counts, there as everywhere.
+
     ```python
     import gymnasium
 
@@ -41,6 +44,9 @@ class SpooferEnv(SingleEnv):
     - `action="innovation"`: the mean whitened innovation that the coming fix is to provoke in the position axes, one
       unit being 4 sigma. The spoofer's shadow filter turns it into the offset; there is no limit of the rate. Needs
       `knowledge` "shadow" or "full".
+
+    On `song-robot` "up" does not enter the estimate; it still shows in tests that look at the height, as `snapshot`
+    does.
 
     ## Observation Space
 

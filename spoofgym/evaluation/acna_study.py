@@ -2,7 +2,8 @@
 
 ``python -m spoofgym.evaluation.acna_study`` plays the robot under the paper's jump and slow-change attacks with every
 pair of window and threshold, each test alone, and prints what the best and the published pairs give. An alarm leaves
-the fix out, so that the auxiliary position runs on, as the paper's steps 1 to 8 say.
+the fix out, so that the auxiliary position runs on, as the paper's steps 1 to 8 say. ``--figure FILE`` draws the
+rates over the thresholds; ``--json -`` prints JSON alone.
 
 Rates are in the usual orientation: a false alarm is an alarm on a clean fix, a missed detection a spoofed fix without
 one. The paper calls normal positive, so that its P_FA (eq 13) is what is missed here and its P_MD (eq 14) the false
@@ -12,9 +13,12 @@ alarms; their sum and the accuracy P_D (eq 12) are the same.
 from __future__ import annotations
 
 import argparse
+import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +45,8 @@ ATTACKS = {"jump": "jump:onset=150", "slow": "slow-change:onset=150"}
 """Data sets Ψ̃2 and Ψ̃3; both last to the end."""
 EPOCHS = np.arange(1, 21)
 """n_j and n_s (section 4.3)."""
+WINDOWS = (1, 2, 3, 5, 10, 20)
+"""Of the table."""
 THRESHOLDS = {"jump": np.round(0.1 * np.arange(61), 10), "slow": np.round(0.1 * np.arange(101), 10)}
 """Th_j of eq 30 and Th_s of eq 33, m, the latter in steps of 0.1 m instead of 0.01 m."""
 PUBLISHED = {
@@ -48,6 +54,7 @@ PUBLISHED = {
     "slow": (SONG_SLOW_EPOCHS, SONG_SLOW_THRESHOLD),
 }
 SYMBOLS = {"jump": ("n_j", "Th_j"), "slow": ("n_s", "Th_s")}
+PICTURES = (".png", ".svg", ".pdf")
 COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd")
 
 
@@ -163,21 +170,33 @@ def study(scenario: str, test: str, runs: int, seed: int) -> Rates:
     return Rates(*(part.reshape(windows.shape) for part in (rates.accuracy, rates.false_alarm, rates.missed)))
 
 
-def rows(test: str, grid: Rates, published: Rates) -> list[str]:
-    """Lines of the table: the best threshold of some windows, then the published pair."""
-    lines = []
-    for window in (1, 2, 3, 5, 10, 20):
+def rows(test: str, grid: Rates, published: Rates) -> list[dict[str, Any]]:
+    """A row for the best threshold of some windows each, then one for the published pair."""
+    result = []
+    for window in WINDOWS:
         best = int(grid.accuracy[window - 1].argmax())
-        level = THRESHOLDS[test][best]
-        lines.append(_row(test, f"best Th, {SYMBOLS[test][0]} = {window}", level, grid, (window - 1, best)))
-    lines.append(_row(test, f"published, {SYMBOLS[test][0]} = {PUBLISHED[test][0]}", PUBLISHED[test][1], published, 0))
-    return lines
+        result.append(_row(test, "best", window, THRESHOLDS[test][best], grid, (window - 1, best)))
+    result.append(_row(test, "published", *PUBLISHED[test], published, (0,)))
+    return result
 
 
-def _row(test: str, name: str, level: float, rates: Rates, place: int | tuple[int, int]) -> str:
+def _row(test: str, choice: str, window: int, level: float, rates: Rates, place: tuple[int, ...]) -> dict[str, Any]:
+    return {
+        "test": test,
+        "choice": choice,
+        "window": window,
+        "threshold_m": float(level),
+        "accuracy": float(rates.accuracy[place]),
+        "false_alarm": float(rates.false_alarm[place]),
+        "missed": float(rates.missed[place]),
+    }
+
+
+def _line(row: dict[str, Any]) -> str:
+    choice = "best Th" if row["choice"] == "best" else row["choice"]
     return (
-        f"| {test} | {name} | {level:.2f} | {rates.accuracy[place]:.3f} | {rates.false_alarm[place]:.3f} "
-        f"| {rates.missed[place]:.3f} |"
+        f"| {row['test']} | {choice}, {SYMBOLS[row['test']][0]} = {row['window']} | {row['threshold_m']:.2f} "
+        f"| {row['accuracy']:.3f} | {row['false_alarm']:.3f} | {row['missed']:.3f} |"
     )
 
 
@@ -207,37 +226,76 @@ def draw(grids: dict[str, Rates], path: Path) -> None:
             axes[row, column].grid(alpha=0.25)
         axes[0, column].set(title=f"{test} test alone; dotted: the paper's {PUBLISHED[test][1]:g} m")
         axes[1, column].set(xlabel=f"${level}$, m")
-        axes[0, column].legend(fontsize=8, loc="lower right")
+        # below the panels: within them it would lie on the curves, which meet at either end
+        axes[1, column].legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False, ncols=4)
     axes[0, 0].set(ylabel="accuracy")
     axes[1, 0].set(ylabel="false alarms + missed")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
 
 
+def _picture(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() not in PICTURES:
+        raise argparse.ArgumentTypeError(f"a figure's name ends in {', '.join(PICTURES)}, got {text!r}")
+    return path
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.acna_study", description=main.__doc__)
+    add = result.add_argument
+    add("--scenario", default="song-robot", help="with an odometer (default: %(default)s)")
+    add("--runs", type=int, default=10, help="per pair (default: %(default)s)")
+    add("--seed", type=int, default=0, help="of run 0 (default: %(default)s)")
+    add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
+    add("--figure", type=_picture, metavar="FILE",
+        help="write a figure: PNG, SVG or PDF by its ending (needs matplotlib)")
+    return result
+
+
+def _report(scenario: str, runs: int, seed: int, grids: dict[str, Rates]) -> dict[str, Any]:
+    """The ``"acna-study"`` report: the rows of both tests."""
+    found = []
+    for test, grid in grids.items():
+        window, level = PUBLISHED[test]
+        found += rows(test, grid, play(scenario, test, np.array([window]), np.array([level]), runs, seed))
+    return {
+        "schema_version": 1,
+        "kind": "acna-study",
+        "scenario": scenario,
+        "runs": runs,
+        "seed": seed,
+        "rows": found,
+    }
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Study windows and thresholds of ACNA: a table, and a figure where one is asked for."""
-    parser = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.acna_study", description=main.__doc__)
-    parser.add_argument("--scenario", default="song-robot", help="with an odometer (default: %(default)s)")
-    parser.add_argument("--runs", type=int, default=10, help="per pair (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of run 0 (default: %(default)s)")
-    parser.add_argument("--figure", type=Path, help="write the picture to this file (needs matplotlib)")
-    options = parser.parse_args(arguments)
+    """Study windows and thresholds of ACNA: a table, and JSON and a figure where they are asked for."""
+    command = parser()
+    options = command.parse_args(arguments)
     common = (options.runs, options.seed)
     try:
         grids = {test: study(options.scenario, test, *common) for test in TESTS}
-        published = {}
-        for test in TESTS:
-            window, level = PUBLISHED[test]
-            published[test] = play(options.scenario, test, np.array([window]), np.array([level]), *common)
+        report = _report(options.scenario, *common, grids)
     except ValueError as error:
-        parser.error(str(error))
-    print(f"{options.scenario}, {options.runs} runs per pair from seed {options.seed}\n")
-    print("| test | pair | threshold, m | accuracy | false alarms | missed |")
-    print("|---|---|---|---|---|---|")
-    for test in TESTS:
-        print("\n".join(rows(test, grids[test], published[test])))
+        command.error(str(error))
+    out = sys.stderr if options.json == "-" else sys.stdout
+    print(f"{options.scenario}, {options.runs} runs per pair from seed {options.seed}\n", file=out)
+    print("| test | pair | threshold, m | accuracy | false alarms | missed |", file=out)
+    print("|---|---|---|---|---|---|", file=out)
+    for row in report["rows"]:
+        print(_line(row), file=out)
+    if options.json == "-":
+        print(json.dumps(report, allow_nan=False))
+    elif options.json is not None:
+        path = Path(options.json)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        print(f"rows in {path}", file=out)
     if options.figure is not None:
         draw(grids, options.figure)
+        print(f"figure in {options.figure}", file=out)
 
 
 if __name__ == "__main__":

@@ -67,6 +67,28 @@ def test_headline_tells_how_the_game_ended(arguments: dict, action: np.ndarray, 
     assert f"error {info['error']:.1f} m" in headline(env)
 
 
+@pytest.mark.parametrize(
+    ("scenario", "unit", "metres"), [("song-robot:horizon=60", "m", 1.0), ("liu-flight:horizon=60", "km", 1000.0)]
+)
+def test_the_track_is_readable_and_within_its_frame(scenario: str, unit: str, metres: float) -> None:
+    """A court is drawn in metres, a flight in kilometres, and an offset beyond the court widens the frame."""
+    env = SpooferEnv(render_mode="rgb_array", scenario=scenario, on_alarm="respond")
+    env.reset(seed=0)
+    env.render()
+    for _ in range(60):
+        env.step(FAST)
+    env.render()
+    track = env._figure._figure.axes[1]
+    assert (track.get_xlabel(), track.get_ylabel()) == (f"east, {unit}", f"north, {unit}")
+    (west, east), (south, north) = track.get_xlim(), track.get_ylim()
+    for line in track.get_lines():
+        assert np.all((line.get_xdata() > west) & (line.get_xdata() < east))
+        assert np.all((line.get_ydata() > south) & (line.get_ydata() < north))
+    still_to_come = track.get_lines()[0].get_xydata()
+    np.testing.assert_allclose(metres * still_to_come, env.game.scenario.track()[:, :2], atol=1e-9)
+    env.close()
+
+
 def test_no_render_mode_draws_nothing() -> None:
     env = SpooferEnv()
     env.reset()

@@ -1,5 +1,7 @@
 """The parameter study of ACNA: its tests against the detector, its rates, and the command."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -57,19 +59,50 @@ def test_thresholds_at_the_ends():
     np.testing.assert_allclose(rates.missed, [0.0, 1.0, 3.0 / 150.0])
 
 
-def test_the_command(capsys, monkeypatch, tmp_path):
-    def few(scenario, test, runs, seed):
+@pytest.fixture
+def few(monkeypatch):
+    """A grid of invented rates in place of the study, the accuracy of whose pairs rises with the threshold."""
+
+    def rates(scenario, test, runs, seed):
         shape = (20, len(acna_study.THRESHOLDS[test]))
         values = np.linspace(0.0, 1.0, shape[0] * shape[1]).reshape(shape)
         return Rates(values, 0.5 - 0.5 * values, 0.5 - 0.5 * values)
 
-    monkeypatch.setattr(acna_study, "study", few)
-    acna_study.main(["--runs", "1", "--figure", str(tmp_path / "deep" / "study.png")])
+    monkeypatch.setattr(acna_study, "study", rates)
+
+
+@pytest.mark.usefixtures("few")
+def test_the_command(capsys, tmp_path):
+    figure = tmp_path / "deep" / "study.png"
+    acna_study.main(["--runs", "1", "--figure", str(figure)])
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "song-robot, 1 runs per pair from seed 0"
     assert sum(line.startswith("| jump |") for line in lines) == 7
     assert "| slow | published, n_s = 5 | 1.28 |" in "\n".join(lines)
-    assert (tmp_path / "deep" / "study.png").stat().st_size > 10_000
+    assert lines[-1] == f"figure in {figure}"
+    assert figure.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.usefixtures("few")
+def test_json_alone_on_stdout_or_in_a_file(capsys, tmp_path):
+    acna_study.main(["--runs", "1", "--json", "-"])
+    printed = capsys.readouterr()
+    report = json.loads(printed.out)
+    assert (report["schema_version"], report["kind"]) == (1, "acna-study")
+    assert (report["scenario"], report["runs"], report["seed"]) == ("song-robot", 1, 0)
+    assert sum(line.startswith(("| jump |", "| slow |")) for line in printed.err.splitlines()) == len(report["rows"])
+    for test in ("jump", "slow"):
+        *best, published = (row for row in report["rows"] if row["test"] == test)
+        assert [(row["choice"], row["window"]) for row in best] == [("best", n) for n in (1, 2, 3, 5, 10, 20)]
+        assert {row["threshold_m"] for row in best} == {acna_study.THRESHOLDS[test][-1]}
+        assert best[-1]["accuracy"] == 1.0
+        assert (published["choice"], published["window"], published["threshold_m"]) == ("published", *PUBLISHED[test])
+        alone = play("song-robot", test, *(np.array([value]) for value in PUBLISHED[test]), 1, 0)
+        assert [published[name] for name in ("false_alarm", "missed")] == [alone.false_alarm[0], alone.missed[0]]
+    path = tmp_path / "deep" / "study.json"
+    acna_study.main(["--runs", "1", "--json", str(path)])
+    assert json.loads(path.read_text()) == report
+    assert capsys.readouterr().out.splitlines()[-1] == f"rows in {path}"
 
 
 def test_the_study_has_all_pairs(monkeypatch):
@@ -88,3 +121,6 @@ def test_bad_arguments_are_refused(capsys):
     with pytest.raises(SystemExit):
         acna_study.main(["--runs", "0"])
     assert "runs must be a whole number, 1 or more, got 0" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        acna_study.main(["--figure", "study.gif"])
+    assert "a figure's name ends in .png, .svg, .pdf, got 'study.gif'" in capsys.readouterr().err

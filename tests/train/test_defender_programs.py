@@ -264,6 +264,23 @@ def test_a_defender_on_the_command_line_is_the_one_of_the_list(capsys):
 
 
 @pytest.mark.usefixtures("world")
+def test_what_does_not_fit_the_scenario_is_left_out(capsys, monkeypatch):
+    """The robot has no inertial solution: what needs one is told on one line, unless somebody asked for it."""
+    relative, robot = "relative-motion:k=20,threshold=30", "song-robot:horizon=40"
+    unfit = (listed.ClassicalDefender("foi-relative-b20", relative, "exclude-and-backtrack:20"),)
+    monkeypatch.setattr(defenders, "WORLD_DETECTORS", ("snapshot", WINDOWED, SIGNED, relative))
+    monkeypatch.setattr(defenders, "PUBLISHED", PUBLISHED + unfit)
+    few = ["--scenario", robot, "--threads", "1", "--episodes", "5", "--population", "training"]
+    assert evaluate.main([*few, "--defender", "snapshot > exclude", "--json", "-"]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["kinds"] == {**DEFENDERS, "snapshot > exclude": "given"}
+    (line,) = [line for line in printed.err.splitlines() if line.startswith("left out")]
+    assert line.endswith(f"{robot} does not give what they need: foi-relative-b20 ({relative})")
+    assert evaluate.main([*few, "--defender", f"{relative} > exclude"]) == 2
+    assert "needs inertial solution" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.usefixtures("world")
 def test_comparisons_are_paired(run, tmp_path, capsys):
     other = tmp_path / "other"
     shutil.copytree(run, other)
