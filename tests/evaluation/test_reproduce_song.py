@@ -65,7 +65,7 @@ def test_the_jump_test_alone_is_an_epoch_later_than_both(drives):
     """Its window is two; the mean of five sees 28 m at once. Noise would have to exceed 20 m to change that."""
     quiet = latency(drives.tracks["set-a", MIX, ACNA], 50.0, 100.0)
     np.testing.assert_array_equal(quiet, 1.0)
-    assert np.median(drives.jump_test["set-a"]) == 2.0
+    assert np.median(latency(drives.jump_test["set-a"], 50.0, 100.0)) == 2.0
 
 
 def test_rows_have_every_figure_of_tables_3_to_7():
