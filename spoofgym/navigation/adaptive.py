@@ -6,7 +6,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.adaptation import Adaptation, adapt, negative_ratio
-from spoofgym.navigation.interface import Decision, Demands, Innovation
+from spoofgym.navigation.interface import Demands, Innovation
 from spoofgym.navigation.linear import NO_DEMANDS
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose import StrapdownNavigator
@@ -131,7 +131,8 @@ class AdaptiveNavigator(OwnCovarianceNavigator):
     """N self-tuning filters in the linear fidelity.
 
     The innovation has the R matched to the fixes before it, R_{k-1}: with R_k, as the paper's (14) reads, S would hold
-    the residual of the fix under test. A fix that is left out, or reset to, does not enter the windows.
+    the residual of the fix under test. A fix that is left out, or reset to, does not enter the windows. `resolve`
+    raises `NegativeRatioError` where an unguarded run meets α < 0.
 
     Attributes:
         tuned: what the filters have learnt of their noises.
@@ -168,15 +169,6 @@ class AdaptiveNavigator(OwnCovarianceNavigator):
         innovation = super()._innovate(runs, noise_scale)
         self.tuned.note(runs, innovation, noise_scale)
         return innovation
-
-    def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
-        """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
-
-        Raises:
-            ValueError: a backtrack without a history.
-            NegativeRatioError: an unguarded run has met α < 0.
-        """
-        super().resolve(decision, runs)
 
     def _correct(self, runs: Runs) -> None:
         super()._correct(runs)
@@ -222,15 +214,6 @@ class AdaptiveStrapdownNavigator(StrapdownNavigator):
         innovation = super()._innovate(runs, noise_scale)
         self.tuned.note(runs, innovation, noise_scale)
         return innovation
-
-    def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
-        """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
-
-        Raises:
-            ValueError: a backtrack without a history.
-            NegativeRatioError: an unguarded run has met α < 0.
-        """
-        super().resolve(decision, runs)
 
     def _correct(self, runs: Runs) -> None:
         super()._correct(runs)

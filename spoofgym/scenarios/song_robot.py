@@ -25,7 +25,7 @@ from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G
-from spoofgym.sensors.odometer import Odometer, OdometerGrade, PlanarMotion, odometer_grade
+from spoofgym.sensors.odometer import GRADES, Odometer, OdometerGrade, PlanarMotion, odometer_grade
 from spoofgym.sensors.receiver import Receiver, draw_noise
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
@@ -265,7 +265,7 @@ def song_robot(
     owner = "song-robot"
     validation.one_of(owner, "data", data, DATA)
     validation.one_of(owner, "noise", noise, NOISES)
-    validation.one_of(owner, "odometer", odometer, ("set-a", "set-b", "table-1"))
+    validation.one_of(owner, "odometer", odometer, tuple(GRADES))
     sigma = validation.above(owner, "sigma", sigma)
     horizon = validation.whole(owner, "horizon", horizon, 1)
     onset = validation.finite(owner, "onset", onset)
