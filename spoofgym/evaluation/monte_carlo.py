@@ -103,22 +103,17 @@ class _Watch:
         self.alarm_error = np.zeros((detectors, runs))
         self.peak = np.full((detectors, runs), -np.inf)
 
-    def see(self, place: int, epoch: int, ratio: Floats, error: Floats, runs: Flags) -> None:
-        """Take one detector's epoch: its statistic over its threshold and the errors, (n,), where ``runs`` says so."""
-        peak = np.where(runs, ratio, -np.inf)
-        np.maximum(self.peak[place], peak, out=self.peak[place])
-        fresh = (peak > 1.0) & (self.alarm_epoch[place] == NEVER)
+    def forget(self, runs: Flags) -> None:
+        """Begin anew with runs, (n,)."""
+        self.alarm_epoch[:, runs] = NEVER
+        self.peak[:, runs] = -np.inf
+
+    def see(self, place: int, epoch: int, ratio: Floats, error: Floats) -> None:
+        """Take one detector's epoch: its statistic over its threshold, and the errors, (n,)."""
+        np.maximum(self.peak[place], ratio, out=self.peak[place])
+        fresh = (ratio > 1.0) & (self.alarm_epoch[place] == NEVER)
         self.alarm_epoch[place, fresh] = epoch
         self.alarm_error[place, fresh] = error[fresh]
-
-    def put(self, other: _Watch, runs: Flags) -> None:
-        """Take from another watch what it saw of runs, (n,)."""
-        for mine, theirs in (
-            (self.alarm_epoch, other.alarm_epoch),
-            (self.alarm_error, other.alarm_error),
-            (self.peak, other.peak),
-        ):
-            mine[:, runs] = theirs[:, runs]
 
 
 def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch, Runs]:
@@ -128,22 +123,20 @@ def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch
         What was seen, from the attack on where there is one, and the last epoch before it, (n,).
     """
     detectors, n = simulation.detectors, simulation.num_runs
-    everything, attacked = (_Watch(len(detectors), n) for _ in range(2))
-    begun, always = np.zeros(n, dtype=bool), np.ones(n, dtype=bool)
-    onset_epoch = np.zeros(n, dtype=np.int64)
+    watch = _Watch(len(detectors), n)
+    begun, onset_epoch = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64)
     for epoch in range(1, simulation.scenario.timeline.num_epochs + 1):
         advance()
         begins = ~begun & simulation.offset.any(axis=1)
-        onset_epoch[begins] = epoch - 1
-        begun |= begins
+        if begins.any():
+            onset_epoch[begins] = epoch - 1
+            begun |= begins
+            watch.forget(begins)
         error = horizontal(simulation.error)
         for place, (name, detector) in enumerate(detectors.items()):
             assert detector.threshold is not None
-            ratio = simulation.epoch.statistics[name] / detector.threshold
-            everything.see(place, epoch, ratio, error, always)
-            attacked.see(place, epoch, ratio, error, begun)
-    everything.put(attacked, begun)
-    return everything, onset_epoch
+            watch.see(place, epoch, simulation.epoch.statistics[name] / detector.threshold, error)
+    return watch, onset_epoch
 
 
 def _watched(simulation: Simulation, watch: _Watch, onset_epoch: Runs, final_error: Floats) -> WatchedEpisodes:
