@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.detectors.base import Detector
+from spoofgym.detectors.base import Detector, seen, seen_dimension
 from spoofgym.navigation.facts import FilterFacts
-from spoofgym.navigation.interface import Epoch, Innovation
+from spoofgym.navigation.interface import Epoch
+from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 
@@ -22,31 +23,30 @@ JointStatistics = Callable[[Sequence[Detector], int, np.random.Generator], list[
 """The same of several detectors on the same clean runs."""
 
 
-def white_statistics(factors: Floats, num_epochs: int, facts: FilterFacts | None = None) -> CleanStatistics:
-    """Statistics on the innovations of a matched filter, which are white: residual = L n.
+def white_statistics(
+    innovations: WhiteInnovations | Floats, num_epochs: int, facts: FilterFacts | None = None
+) -> CleanStatistics:
+    """Statistics on the innovations of a matched filter, which are white.
 
     Args:
-        factors: L, lower, of every epoch (m, m), or of epochs 0..K (K+1, m, m), where epoch 0 stands for those before.
+        innovations: by epoch; or L, lower, of every epoch (m, m), or of epochs 0..K (K+1, m, m).
         num_epochs: K, of a run.
         facts: of the filter, for detectors that ask for them.
     """
-    m = factors.shape[-1]
-    steady = factors.ndim == 2
+    if isinstance(innovations, WhiteInnovations):
+        white = innovations
+    else:
+        white = WhiteInnovations(innovations.reshape(-1, *innovations.shape[-2:]))
 
     def statistics(detector: Detector, runs: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        detector.bind(runs, m)
+        detector.bind(runs, seen_dimension(detector, white.dimension, white.range_response is not None))
         if facts is not None:
             detector.know(facts)
         kept = np.empty((runs, detector.memory + num_epochs))
         for k in range(kept.shape[1]):
-            factor = factors if steady else factors[max(k - detector.memory, 0)]
-            covariance = np.broadcast_to(factor @ factor.T, (runs, m, m))
-            whitened = rng.standard_normal((runs, m))
-            residual = np.einsum("nj,ij->ni", whitened, factor)
-            nis = np.einsum("nj,nj->n", whitened, whitened)
             index = np.full(runs, k - detector.memory)
-            epoch = Epoch(index, index.astype(np.float64), Innovation(residual, covariance, whitened, nis))
-            kept[:, k] = detector.update(epoch)
+            innovation = white.innovation(k - detector.memory, rng.standard_normal((runs, white.dimension)))
+            kept[:, k] = detector.update(seen(detector, Epoch(index, index.astype(np.float64), innovation)))
         return kept[:, : detector.memory], kept[:, detector.memory :]
 
     return statistics
@@ -61,6 +61,7 @@ class _BurnIn(Detector):
         self._detector = detector
         self.memory = detector.memory
         self.demands = detector.demands
+        self.in_position = detector.in_position
 
     @property
     def name(self) -> str:

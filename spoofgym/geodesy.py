@@ -160,6 +160,24 @@ def enu_displacement(
     )
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def ecef(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:
+    """Earth-centred Earth-fixed coordinates of one position (Groves 2013 eq 2.112).
+
+    Args:
+        latitude: rad.
+        longitude: rad.
+        height: m.
+
+    Returns:
+        x, y, z, m.
+    """
+    _, transverse = radii_of_curvature(latitude)
+    radius = (transverse + height) * math.cos(latitude)
+    polar = ((1.0 - ECCENTRICITY_SQUARED) * transverse + height) * math.sin(latitude)
+    return radius * math.cos(longitude), radius * math.sin(longitude), polar
+
+
 def position_difference(position_a: ArrayLike, position_b: ArrayLike) -> NDArray[np.float64]:
     """`position_a` minus `position_b` in metres, by the radii of curvature at `position_b` (see `enu_difference`).
 
@@ -229,7 +247,8 @@ def ecef_to_geodetic(ecef: ArrayLike) -> NDArray[np.float64]:
     Raises:
         ValueError: The argument does not end in three components.
     """
-    return _stack(pymap3d.ecef2geodetic(*_columns(ecef), deg=False))
+    # pymap3d drops the axis of a latitude that stands alone
+    return _stack(pymap3d.ecef2geodetic(*_columns(ecef), deg=False)).reshape(np.shape(ecef))
 
 
 def geodetic_to_enu(position: ArrayLike, origin: ArrayLike) -> NDArray[np.float64]:
@@ -303,4 +322,4 @@ def _columns(values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 
 def _stack(columns: tuple[Any, ...]) -> NDArray[np.float64]:
-    return np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=-1)
+    return np.stack(np.broadcast_arrays(*(np.asarray(column, dtype=np.float64) for column in columns)), axis=-1)

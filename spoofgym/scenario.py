@@ -13,16 +13,19 @@ from spoofgym.geodesy import position_difference
 from spoofgym.navigation.adaptation import Adaptation
 from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
-from spoofgym.navigation.interface import Demands, Navigator, Timeline, manoeuvre_times
+from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline, manoeuvre_times
 from spoofgym.navigation.linear import LinearNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
 from spoofgym.navigation.loose import StrapdownNavigator
 from spoofgym.navigation.own_covariance import OwnCovarianceNavigator
 from spoofgym.navigation.strapdown_model import strapdown_model
+from spoofgym.navigation.tight_model import TightModel
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT, WarmStart, cold_start, warm_up
+from spoofgym.navigation.warm_start import COLOUR, RANGES, WarmStart, cold_start, num_joint, warm_up
+from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
+from spoofgym.sensors.range_fix import RangeFix, draw_fix_noise
 from spoofgym.sensors.receiver import Receiver, draw_noise
 from spoofgym.streams import RunStreams
 from spoofgym.trajectory import Trajectory
@@ -50,6 +53,10 @@ class Scenario(ABC):
         offers: what its navigator gives to monitors beside innovations.
         matched: whether the filter's model is the truth, so that clean innovations are white.
         random: whether every episode is drawn anew; a recorded log has one realisation.
+        coupling: ``loose``: the filter takes fixes; ``tight``: it takes the ranges to satellites.
+        slots: S, satellites that a tightly coupled filter tracks at most.
+        clock_rate: the largest rate at which a spoofer pulls the clock of a receiver of ranges, m/s.
+        alert_limits: horizontal and vertical position error from which the navigation is hazardous, m.
     """
 
     name: str
@@ -64,6 +71,10 @@ class Scenario(ABC):
     offers: tuple[str, ...] = (INERTIAL_SOLUTION, LINEAR_MODEL)
     matched: bool
     random: bool = True
+    coupling: str = "loose"
+    slots: int = 0
+    clock_rate: float = 0.0
+    alert_limits: tuple[float, float] = (556.0, 50.0)
 
     @property
     @abstractmethod
@@ -99,6 +110,39 @@ class Scenario(ABC):
             ValueError: the scenario has no such model.
         """
 
+    def tight_model(self, burn_in: int = 0) -> TightModel:
+        """The game of a tightly coupled filter from epoch -burn_in on, every range used.
+
+        Raises:
+            ValueError: the filter is loosely coupled.
+        """
+        raise ValueError(f"scenario {self.name!r} is loosely coupled: it has a linear_model, not a tight_model")
+
+    def white_innovations(self) -> WhiteInnovations:
+        """What clean innovations at epochs 0..K are made of, where the filter is matched."""
+        return WhiteInnovations(self.linear_model().innovation_factor)
+
+    def spoofed(self, fidelity: str, index: Runs, burn_in: int, spoof: Spoof) -> Floats:
+        """What a spoofer adds to the measurements of runs, (k, m), m and m/s.
+
+        Args:
+            fidelity: of the navigator.
+            index: epoch of each run, counted from the burn-in's first, (k,).
+            burn_in: clean epochs before epoch 0.
+            spoof: what the receivers are made to believe.
+        """
+        if self.dimension == 3:
+            return spoof.offset
+        return np.concatenate([spoof.offset, spoof.rate], axis=1)
+
+    def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
+        """What multipath adds to the measurements at epochs 0..K, (k, K+1, m), from its effect on fixes, likewise."""
+        return multipath
+
+    def satellites(self, index: Runs, burn_in: int) -> Runs:
+        """Number of the satellite in each slot at epochs counted from the burn-in's first, (k, S); -1 = none."""
+        return np.full((len(index), self.slots), -1)
+
     @abstractmethod
     def navigator(
         self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
@@ -132,6 +176,25 @@ class Scenario(ABC):
             raise ValueError(f"scenario {self.name!r} has no fidelity {fidelity!r}; valid fidelities: {valid}")
 
 
+def check_game(timeline: Timeline, trajectory: Trajectory) -> None:
+    """Refuse a game that does not fit its trajectory.
+
+    Raises:
+        ValueError: no epochs, a game outside the trajectory, or an onset between two epochs.
+    """
+    interval, horizon, onset = timeline.interval, timeline.num_epochs, timeline.start
+    if horizon < 1:
+        raise ValueError(f"horizon must be 1 epoch or more, got {horizon}")
+    first, last = 2 * interval, trajectory.time[-1] - horizon * interval
+    if not first - ROUNDING <= onset <= last + ROUNDING:
+        raise ValueError(
+            f"onset {onset:g} s with a horizon of {horizon} epochs does not fit the trajectory of "
+            f"{trajectory.time[-1]:g} s: valid from {first:g} to {last:g} s"
+        )
+    if abs(onset / interval - round(onset / interval)) > 1e-9:
+        raise ValueError(f"onset {onset:g} s is no epoch of a receiver at {1.0 / interval:g} Hz")
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulatedScenario(Scenario):
     """A scenario with a known true trajectory.
@@ -151,6 +214,9 @@ class SimulatedScenario(Scenario):
         true_position_random_walk: what really acts on the INS position, m/√s.
         adaptation: how the filter tunes itself from the first epoch of a burn-in or a game on; None = a filter with
             constant R and Q. `warm_start` and `linear_model` are of that filter, whatever the adaptation.
+        ranges: noise of the fixes, from the first of the trajectory on, where they are made from ranges; it comes on
+            top of the receiver's. None = they are not.
+        alert_limits: horizontal and vertical, m.
     """
 
     name: str
@@ -166,19 +232,11 @@ class SimulatedScenario(Scenario):
     defender_scale: float = 10.0
     depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
     adaptation: Adaptation | None = None
+    ranges: RangeFix | None = None
+    alert_limits: tuple[float, float] = Scenario.alert_limits
 
     def __post_init__(self) -> None:
-        if self.horizon < 1:
-            raise ValueError(f"horizon must be 1 epoch or more, got {self.horizon}")
-        first, last = 2 * self.receiver.interval, self.trajectory.time[-1] - self.horizon * self.receiver.interval
-        if not first - ROUNDING <= self.onset <= last + ROUNDING:
-            raise ValueError(
-                f"onset {self.onset:g} s with a horizon of {self.horizon} epochs does not fit the trajectory of "
-                f"{self.trajectory.time[-1]:g} s: valid from {first:g} to {last:g} s"
-            )
-        epoch = self.onset * self.receiver.rate
-        if abs(epoch - round(epoch)) > 1e-9:
-            raise ValueError(f"onset {self.onset:g} s is no epoch of a receiver at {self.receiver.rate:g} Hz")
+        check_game(self.timeline, self.trajectory)
         if min(self.drag_off_rate) <= 0 or not self.error_scale > 0:
             raise ValueError(
                 f"drag_off_rate and error_scale must be positive, got {self.drag_off_rate} and {self.error_scale}"
@@ -188,6 +246,15 @@ class SimulatedScenario(Scenario):
                 f"the filter expects fixes of dimension {len(self.tuning.measurement_sigma)}, the receiver gives "
                 f"{self.receiver.dimension}"
             )
+        if self.ranges is not None:
+            self._check_ranges(self.ranges)
+
+    def _check_ranges(self, ranges: RangeFix) -> None:
+        if self.receiver.dimension != 3:
+            raise ValueError("fixes from ranges are of position alone: the receiver's velocity_sigma must be None")
+        needed = self._first(0) + self.horizon + 1
+        if ranges.num_epochs < needed:
+            raise ValueError(f"ranges have {ranges.num_epochs} epochs, the game needs {needed} from the start on")
 
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
@@ -208,6 +275,7 @@ class SimulatedScenario(Scenario):
         """
         return (
             self.adaptation is None
+            and self.ranges is None
             and not any(self.receiver.markov_sigma)
             and np.allclose(self.receiver.white_deviation, self.tuning.measurement_sigma, rtol=1e-12)
             and not np.any(self.grade.instability_sigma)
@@ -243,6 +311,10 @@ class SimulatedScenario(Scenario):
             self.trajectory, self.grade, self.receiver, self.tuning, self.true_position_random_walk, epochs
         )
 
+    def _first(self, burn_in: int) -> int:
+        """Place of epoch -burn_in among those of the trajectory; negative where it does not reach back that far."""
+        return round(self.onset * self.receiver.rate) - 1 - burn_in
+
     def _epochs(self, first: int, last: int) -> ErrorDynamics:
         """Epochs first..last-1 of the trajectory, counted from 0 at its first fix."""
         dynamics = self._dynamics
@@ -260,20 +332,20 @@ class SimulatedScenario(Scenario):
         Raises:
             ValueError: the trajectory does not reach back that far.
         """
-        before = round(self.onset * self.receiver.rate) - 1 - burn_in
+        before = self._first(burn_in)
         if before < 0:
             raise ValueError(
                 f"scenario {self.name!r}: the detectors look back {burn_in} epochs, but a burn-in of so many reaches "
                 f"before the trajectory, which has {before + burn_in} before the game: take detectors with a shorter "
                 "memory, or a later onset where there is one"
             )
-        start = cold_start(self.grade, self.receiver, self.tuning)
-        return warm_up(start, self._epochs(0, before), self.grade, self.receiver, self.tuning)
+        start = cold_start(self.grade, self.receiver, self.tuning, self.ranges)
+        return warm_up(start, self._epochs(0, before), self.grade, self.receiver, self.tuning, self.ranges)
 
     @cache  # noqa: B019 - scenarios live as long as the program
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """The game in the linear fidelity, from epoch -burn_in on, under the filter with constant R and Q."""
-        first = round(self.onset * self.receiver.rate) - 1 - burn_in
+        first = self._first(burn_in)
         timeline = Timeline(
             self.onset - burn_in * self.receiver.interval, self.receiver.interval, self.horizon + burn_in
         )
@@ -306,12 +378,12 @@ class SimulatedScenario(Scenario):
         return StrapdownNavigator(model, num_runs, slices, demands)
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
-        """Joint states of truth and filter just before epoch -burn_in, (n, 30)."""
+        """Joint states of truth and filter just before epoch -burn_in, (n, 30), and slow errors of ranges, if any."""
         factor = self.warm_start(burn_in).joint_factor
-        normals = np.empty((len(runs), NUM_JOINT))
+        normals = np.empty((len(runs), num_joint(self.ranges)))
         for place, run in enumerate(runs):
             streams(run, "initial").standard_normal(out=normals[place])
-        initial = np.zeros((len(runs), NUM_JOINT))
+        initial = np.zeros_like(normals)
         for j in np.flatnonzero(factor.any(axis=0)):
             initial += normals[:, j, None] * factor[:, j]
         return initial
@@ -321,5 +393,9 @@ class SimulatedScenario(Scenario):
         epochs = burn_in + self.horizon + 1
         noise = np.empty((len(runs), epochs, self.dimension))
         for place, run in enumerate(runs):
-            noise[place] = draw_noise(self.receiver, epochs, streams(run, "receiver"), initial[place, COLOUR])
+            stream = streams(run, "receiver")
+            noise[place] = draw_noise(self.receiver, epochs, stream, initial[place, COLOUR])
+            if self.ranges is not None:
+                first = self._first(burn_in)
+                noise[place] += draw_fix_noise(self.ranges, first, first + epochs, stream, initial[place, RANGES])
         return noise

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.detectors.base import Detector
+from spoofgym.detectors.base import Detector, seen, seen_dimension
 from spoofgym.navigation.facts import LINEAR_MODEL
-from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation
+from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
@@ -75,6 +75,7 @@ class Simulation:
             raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
         scenario.check_fidelity(fidelity)
         self.scenario = scenario
+        self.fidelity = fidelity
         self.num_runs = num_runs
         self.streams = RunStreams.from_seed(seed, num_runs)
         self.detectors = {detector.name: detector for detector in detectors}
@@ -92,7 +93,7 @@ class Simulation:
             demands |= part.demands
         self.confounders = confounders
         if confounders is not None:
-            confounders.bind(scenario.timeline, num_runs, scenario.dimension)
+            confounders.bind(scenario.timeline, num_runs, 3 if scenario.coupling == "tight" else scenario.dimension)
             demands |= Demands(excludes=True)
         self.slices = RunSlices(threads)
         self.navigator = scenario.navigator(fidelity, demands, self.burn_in, num_runs, self.slices)
@@ -105,11 +106,12 @@ class Simulation:
         self.used = np.zeros(num_runs, dtype=bool)
         self._no_offset = np.zeros((num_runs, 3))
         self.offset = self._no_offset.copy()
+        self.clock_offset = np.zeros(num_runs)
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
 
     def _bind_attack(self, attack: Attack) -> None:
-        if attack.needs_velocity and self.scenario.dimension != 6:
+        if attack.needs_velocity and (self.scenario.dimension != 6 or self.scenario.coupling == "tight"):
             raise ValueError(
                 f"attack {attack.name!r} needs fixes with velocity (m = 6), scenario {self.scenario.name!r} has fixes "
                 f"of position alone (m = {self.scenario.dimension})"
@@ -122,11 +124,14 @@ class Simulation:
 
     def _bind_detectors(self) -> None:
         for detector in self.detectors.values():
-            detector.bind(self.num_runs, self.scenario.dimension)
+            detector.bind(self.num_runs, self._seen_dimension(detector))
             self.scenario.facts.require(f"detector {detector.name!r}", detector.needs)
             detector.know(self.scenario.facts)
             if detector.threshold is None:
                 raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
+
+    def _seen_dimension(self, detector: Detector) -> int:
+        return seen_dimension(detector, self.scenario.dimension, self.scenario.coupling == "tight")
 
     def _blank_epoch(self) -> Epoch:
         n, m = self.num_runs, self.scenario.dimension
@@ -172,8 +177,8 @@ class Simulation:
         """
         bank = {name: copy.copy(detector) for name, detector in self.detectors.items()}
         for detector in bank.values():
-            detector.bind(len(runs), self.scenario.dimension)
-        self.offset[runs] = 0.0
+            detector.bind(len(runs), self._seen_dimension(detector))
+        self.offset[runs], self.clock_offset[runs] = 0.0, 0.0
         self.used[runs] = False
         if self.attack is not None:
             self.attack.reset(runs, self.streams)
@@ -192,11 +197,11 @@ class Simulation:
         """One try of some runs at the burn-in; whether each alarmed in it, (n,)."""
         part = {name: copy.copy(detector) for name, detector in bank.items()}
         for detector in part.values():
-            detector.bind(len(runs), self.scenario.dimension)
+            detector.bind(len(runs), self._seen_dimension(detector))
         initial = self.scenario.draw_initial(runs, self.burn_in, self.streams)
         self._noise[runs] = self.scenario.draw_receiver_noise(runs, initial, self.burn_in, self.streams)
         if self.confounders is not None:
-            self._noise[runs, self.burn_in :] += self.confounders.noise[runs]
+            self._noise[runs, self.burn_in :] += self.scenario.disturbed(self.confounders.noise[runs], self.burn_in)
         self.navigator.reset(runs, initial, self.streams)
         alarmed = np.zeros(len(runs), dtype=bool)
         for epoch in self._white_epochs(runs):
@@ -226,17 +231,11 @@ class Simulation:
         if memory == 0:
             return []
         whitened = np.stack([self.streams(run, "memory").standard_normal((memory, m)) for run in runs])
-        factor = self.scenario.linear_model().innovation_factor[0]
-        covariance = np.broadcast_to(self.scenario.linear_model().innovation_covariance[0], (len(runs), m, m))
-        epochs = []
+        white, epochs = self.scenario.white_innovations(), []
         for k in range(memory):
             index = np.full(len(runs), k - memory)
-            residual, nis = np.zeros((len(runs), m)), np.zeros(len(runs))
-            for j in range(m):
-                residual += whitened[:, k, j, None] * factor[:, j]
-                nis += whitened[:, k, j] ** 2
             time = self.scenario.timeline.start + index * self.scenario.timeline.interval
-            epochs.append(Epoch(index, time, Innovation(residual, covariance, whitened[:, k].copy(), nis)))
+            epochs.append(Epoch(index, time, white.innovation(k - memory, whitened[:, k])))
         return epochs
 
     def _test(self, epoch: Epoch, detectors: dict[str, Detector]) -> NDArray[np.bool_]:
@@ -247,7 +246,7 @@ class Simulation:
         """
         alarm = np.zeros(len(epoch.index), dtype=bool)
         for name, detector in detectors.items():
-            statistic = detector.update(epoch)
+            statistic = detector.update(seen(detector, epoch))
             epoch.statistics[name] = statistic
             assert detector.threshold is not None
             alarm |= (statistic > detector.threshold) & (epoch.index >= -detector.memory)
@@ -258,21 +257,17 @@ class Simulation:
         if len(runs) == self.num_runs and (runs == self._all).all():
             self.epoch = part
             return
-        whole, innovation = self.epoch, self.epoch.innovation
-        pairs = [
+        whole = self.epoch
+        for target, source in (
             (whole.index, part.index),
             (whole.time, part.time),
-            (innovation.residual, part.innovation.residual),
-            (innovation.covariance, part.innovation.covariance),
-            (innovation.whitened, part.innovation.whitened),
-            (innovation.nis, part.innovation.nis),
-        ]
-        pairs += [(whole.statistics[name], statistic) for name, statistic in part.statistics.items()]
-        for target, source in pairs:
+            *((whole.statistics[name], statistic) for name, statistic in part.statistics.items()),
+        ):
             target[runs] = source
         assert whole.available is not None
         whole.available[runs] = True if part.available is None else part.available
-        self.epoch = replace(whole, view=self._view(self._all))
+        innovation = whole.innovation.put(runs, part.innovation)
+        self.epoch = replace(whole, innovation=innovation, view=self._view(self._all))
 
     def resolve(self, decision: Decision | None = None, runs: Runs | None = None) -> None:
         """Second half of the present epoch of runs (all by default): use the fix, leave it out, take fixes back.
@@ -296,7 +291,8 @@ class Simulation:
         """First half of the next epoch of every run: propagate, measure, form the innovation and the statistics.
 
         Args:
-            offset: of the spoofer, (N, 3), m ENU; None = the attack's, or none where there is no attack.
+            offset: of the spoofer, (N, 3), m ENU, or (N, 4) with that of the receiver's clock, m; None = the attack's,
+                or none where there is no attack.
 
         Raises:
             RuntimeError: a run has no epoch left.
@@ -307,14 +303,10 @@ class Simulation:
         following = navigator.index + 1
         clock = Clock(following - self.burn_in, self._times[following])
         attack = self.attack if offset is None else None
-        if offset is None:
-            offset = self._no_offset if attack is None else attack.offset(clock)
+        spoof = self._spoof(clock, attack, self._no_offset if offset is None else np.asarray(offset, dtype=np.float64))
         deviation = self._noise[self._all, following]
-        deviation[:, :3] += offset
-        if self.scenario.dimension == 6:
-            rate = (offset - self.offset) / self._intervals[following, None]
-            deviation[:, 3:] += rate if attack is None else attack.velocity(clock, rate)
-        self.offset = np.array(offset, dtype=np.float64)
+        deviation += self.scenario.spoofed(self.fidelity, following, self.burn_in, spoof)
+        self.offset, self.clock_offset = spoof.offset, spoof.clock
         navigator.propagate()
         innovation = navigator.innovate(deviation)
         available = self._available(clock.index, innovation)
@@ -323,6 +315,28 @@ class Simulation:
         self.epoch = epoch
         self._decide()
         return epoch
+
+    def _spoof(self, clock: Clock, attack: Attack | None, given: Floats) -> Spoof:
+        """What the receiver is made to believe at an epoch: by the attack, or by offsets from outside."""
+        intervals = self._intervals[clock.index + self.burn_in]
+        offset = given[:, :3] if attack is None else np.array(attack.offset(clock))
+        if attack is not None:
+            moved = attack.clock_offset(clock)
+        else:
+            moved = given[:, 3] if given.shape[1] == 4 else self._no_offset[:, 0]
+        rate = (offset - self.offset) / intervals[:, None]
+        satellites = None
+        if attack is not None:
+            rate = attack.velocity(clock, rate)
+            if self.scenario.coupling == "tight":
+                slots = self.scenario.satellites(clock.index + self.burn_in, self.burn_in)
+                satellites = attack.captured(clock, slots)
+        return Spoof(offset.copy(), rate, moved.copy(), (moved - self.clock_offset) / intervals, satellites)
+
+    @property
+    def attacked(self) -> Flags:
+        """Whether the present fix is spoofed, (N,)."""
+        return np.asarray(self.offset.any(axis=1) | (self.clock_offset != 0.0))
 
     def _available(self, index: Runs, innovation: Innovation) -> Flags:
         """Whether there is a fix in each run, (N,); where there is none, nobody sees an innovation."""
@@ -337,7 +351,7 @@ class Simulation:
     def _decide(self) -> None:
         """The response sees each epoch once."""
         if self.response is not None:
-            self.decision = self.response.decide(self.epoch, self.alarm)
+            self.decision = self.response.decide(self.epoch.in_position, self.alarm)
 
     def _decide_first(self, runs: Runs, epoch: Epoch) -> None:
         """A copy of the response, for these runs alone, sees their epoch 0; the others see each epoch once."""
@@ -345,5 +359,5 @@ class Simulation:
             part = copy.copy(self.response)
             part.bind(len(runs))
             part.reset(np.arange(len(runs)))
-            self.decision = self.decision.put(runs, part.decide(epoch, self.alarm[runs]))
+            self.decision = self.decision.put(runs, part.decide(epoch.in_position, self.alarm[runs]))
             self.response.take(runs, part)

@@ -103,3 +103,17 @@ def test_a_position_without_three_components_is_refused():
         geodesy.position_difference([0.5, 1.0], XIAN)
     with pytest.raises(ValueError, match="three components"):
         geodesy.geodetic_to_ecef(0.5)
+
+
+@pytest.mark.parametrize("shape", [(3,), (1, 3), (2, 3), (1, 1, 3)])
+def test_cartesian_conversions_keep_the_shape(shape):
+    point = np.broadcast_to([4e6, 1e6, 4.8e6], shape)
+    back = geodesy.geodetic_to_ecef(geodesy.ecef_to_geodetic(point))
+    assert back.shape == shape
+    np.testing.assert_allclose(back, point, atol=1e-6)
+
+
+def test_compiled_cartesian_coordinates_are_pymap3ds():
+    for latitude in LATITUDES:
+        expected = pymap3d.geodetic2ecef(latitude, 0.7, 12_000.0, deg=False)
+        np.testing.assert_allclose(geodesy.ecef(latitude, 0.7, 12_000.0), expected, atol=1e-8)

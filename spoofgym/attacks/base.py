@@ -88,6 +88,19 @@ class Attack(ABC):
         """
         return rate
 
+    def clock_offset(self, clock: Clock) -> Floats:
+        """How far the receiver's clock is pulled away at the epoch, (N,), m; only a filter on ranges sees it."""
+        return np.zeros(len(clock.index))
+
+    def captured(self, clock: Clock, satellites: Runs) -> Flags | None:
+        """Which satellites' signals the receiver takes from the spoofer at the epoch, (N, S); None = all.
+
+        Args:
+            clock: of the epoch.
+            satellites: number of the satellite in each slot, (N, S); -1 = none.
+        """
+        return None
+
     @abstractmethod
     def offset(self, clock: Clock) -> Floats:
         """The offset added to the fix of the epoch at ``clock``, (N, 3), m ENU; zero until the onset."""

@@ -45,6 +45,7 @@ class Acceleration(ThresholdDetector):
     demands = Demands(auxiliary=True)
     needs = (INERTIAL_SOLUTION,)
     needs_view = True
+    in_position = True
 
     def __init__(self, n: int = DEFAULT_LAG, threshold: float | None = None, arl0: float | None = None) -> None:
         self.n = validation.whole(self.kind, "n", n, 1)

@@ -84,6 +84,7 @@ class Acna(Detector):
     """
 
     PRESETS = ("song",)
+    in_position = True
 
     def __init__(
         self,

@@ -34,6 +34,8 @@ class Detector(ABC):
         members: detectors within this one, which are calibrated before it.
         needs_view: it reads the epoch's view, so that only simulated runs can calibrate it.
         lacks_slope: its statistic grows along clean runs, and `set_slope` has not told yet how fast.
+        in_position: it tests axes of the position, so that ranges are turned into a position before it sees them
+            (`Innovation.in_position`).
         memory: epochs that the statistic looks back, the present one left out; a warm start needs as many clean epochs.
     """
 
@@ -48,6 +50,7 @@ class Detector(ABC):
     members: Sequence[Detector] = ()
     needs_view: bool = False
     lacks_slope: bool = False
+    in_position: bool = False
     memory: int = 0
 
     @property
@@ -56,7 +59,7 @@ class Detector(ABC):
         """The specification that builds this detector."""
 
     def bind(self, num_runs: int, dimension: int) -> None:  # noqa: B027 - a snapshot needs no memory
-        """Allocate the memory of ``num_runs`` runs for fixes of ``dimension`` m (3 or 6)."""
+        """Allocate the memory of ``num_runs`` runs for fixes of ``dimension`` m (3, 6, or two per satellite slot)."""
 
     def know(self, facts: FilterFacts) -> None:  # noqa: B027 - most tests do without
         """Learn, after `bind`, what the designer of the filter knows.
@@ -109,6 +112,16 @@ class Detector(ABC):
         their memory.
         """
         take_runs(self, runs, other)
+
+
+def seen(detector: Detector, epoch: Epoch) -> Epoch:
+    """The epoch as the detector sees it: in the position domain, if it tests axes of the position."""
+    return epoch.in_position if detector.in_position else epoch
+
+
+def seen_dimension(detector: Detector, dimension: int, ranges: bool) -> int:
+    """The dimension of the innovations that it sees, where the filter's is ``dimension``, of ranges or of fixes."""
+    return 3 if ranges and detector.in_position else dimension
 
 
 class ThresholdDetector(Detector):

@@ -61,7 +61,6 @@ class Cusum(ThresholdDetector):
     def bind(self, num_runs: int, dimension: int) -> None:
         """Allocate the sums."""
         self._sum = np.zeros(num_runs)
-        self._reference = self.k * dimension
 
     def reset(self, runs: Runs) -> None:
         """Start the sums of these runs anew."""
@@ -69,7 +68,7 @@ class Cusum(ThresholdDetector):
 
     def update(self, epoch: Epoch) -> Floats:
         """S, (N,)."""
-        grown = np.maximum(self._sum + epoch.innovation.nis - self._reference, 0.0)
+        grown = np.maximum(self._sum + epoch.innovation.nis - self.k * epoch.innovation.degrees, 0.0)
         self._sum = grown if epoch.available is None else np.where(epoch.available, grown, self._sum)
         return self._sum.copy()
 
@@ -100,6 +99,7 @@ class SignedCusum(ThresholdDetector):
     """
 
     kind = "signed-cusum"
+    in_position = True
 
     def __init__(self, k: float = DEFAULT_SHIFT, threshold: float | None = None, arl0: float | None = None) -> None:
         self.k = validation.above(self.kind, "k", k)

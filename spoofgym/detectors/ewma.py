@@ -74,6 +74,7 @@ class Ewma(_ExponentialAverage):
     """
 
     kind = "ewma"
+    in_position = True
 
     def bind(self, num_runs: int, dimension: int) -> None:
         """Allocate the averages of the position."""

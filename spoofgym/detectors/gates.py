@@ -60,6 +60,8 @@ class Gate(ThresholdDetector):
         ValueError: both are given, or a value is out of range.
     """
 
+    in_position = True
+
     def __init__(self, gate: float | None = None, arl0: float | None = None) -> None:
         validation.at_most_one(self.kind, gate=gate, arl0=arl0)
         self.gate = at_least_one_sigma(self.kind, "gate", DEFAULT_GATE if gate is None else gate)

@@ -39,6 +39,7 @@ class MeanInnovation(ThresholdDetector):
     """
 
     kind = "mean-innovation"
+    in_position = True
 
     def __init__(self, n: int = DEFAULT_WINDOW, threshold: float | None = None, arl0: float | None = None) -> None:
         self.n = validation.whole(self.kind, "n", n, 1)

@@ -78,6 +78,7 @@ class RelativeMotion(Detector):
     demands = Demands(auxiliary=True)
     needs = (INERTIAL_SOLUTION,)
     needs_view = True
+    in_position = True
 
     def __init__(
         self,

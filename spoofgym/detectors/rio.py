@@ -27,6 +27,7 @@ class Rio(ThresholdDetector):
     """
 
     kind = "rio"
+    in_position = True
 
     def __init__(self, threshold: float | None = None, arl0: float | None = None) -> None:
         self.set_up(threshold, arl0)

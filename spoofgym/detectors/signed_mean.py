@@ -42,6 +42,7 @@ class SignedMean(ThresholdDetector):
     """
 
     kind = "signed-mean"
+    in_position = True
     default_arl0 = 1e3
 
     def __init__(

@@ -198,7 +198,7 @@ class DefenderGame:
     @property
     def attacked(self) -> Flags:
         """Whether the present fix is spoofed, (N,)."""
-        return np.asarray(self.simulation.offset.any(axis=1))
+        return self.simulation.attacked
 
     @property
     def clean(self) -> Flags:

@@ -152,7 +152,7 @@ def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, 
             simulation.resolve()
             simulation.observe()
             alarm = simulation.alarm
-            if simulation.offset[0].any():
+            if simulation.attacked[0]:
                 spoofed += 1
                 missed += ~alarm
                 right += alarm

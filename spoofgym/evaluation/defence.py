@@ -155,7 +155,7 @@ def play_oracle_onset(world: World, episodes: int, seed: int) -> DefenceEpisodes
     """Games of a defender that knows when fixes are spoofed, and leaves out just these."""
 
     def decide(simulation: Simulation) -> Flags:
-        spoofed = np.asarray(simulation.offset.any(axis=1))
+        spoofed = simulation.attacked
         simulation.resolve(Decision(~spoofed))
         return spoofed
 
@@ -259,7 +259,7 @@ class _Record:
         assert simulation.epoch.available is not None
         assert simulation.confounders is not None
         self.available[:, k] = simulation.epoch.available
-        self.attacked[:, k] = simulation.offset.any(axis=1)
+        self.attacked[:, k] = simulation.attacked
         self.multipath[:, k] = simulation.confounders.multipath[:, k]
 
     def episodes(self, simulation: Simulation) -> DefenceEpisodes:

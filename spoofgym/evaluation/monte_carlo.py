@@ -127,7 +127,7 @@ def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch
     begun, onset_epoch = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64)
     for epoch in range(1, simulation.scenario.timeline.num_epochs + 1):
         advance()
-        begins = ~begun & simulation.offset.any(axis=1)
+        begins = ~begun & simulation.attacked
         if begins.any():
             onset_epoch[begins] = epoch - 1
             begun |= begins

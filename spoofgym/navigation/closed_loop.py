@@ -50,46 +50,33 @@ def propagate(
     in a ring, W = 6 samples + 9 of the epoch, or 0 where the samples have errors of their own. The unaided solution
     minus the filter, auxiliary (N, 15), is carried by the same Φ, or is none, (N, 0).
     """
-    rate, force, mean_force, residual_bias = np.empty(3), np.empty(3), np.empty(3), np.empty(6)
-    middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
-    dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
+    mean_force, residual_bias, mean = np.empty(3), np.empty(6), np.empty(NUM_NAVIGATION)
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
-    half_noise, mean = np.zeros((NUM_STATES, NUM_STATES)), np.empty(NUM_NAVIGATION)
+    half_noise = np.zeros((NUM_STATES, NUM_STATES))
     noisy = normals.shape[2] > 0
     last = normals.shape[2] - NUM_EPOCH_NOISES
     for run in runs:
         index[run] += 1
         noise = normals[run, index[run] % normals.shape[1]]
-        start, stop = boundaries[index[run]], boundaries[index[run] + 1]
-        middle = start + (stop - start) // 2
-        mean_force[:] = 0.0
-        interval = 0.0
-        # views taken once: slicing in the loop over samples would cost a quarter of its time
-        run_attitude, run_velocity, run_position = attitude[run], velocity[run], position[run]
         for a in range(6):
             residual_bias[a] = true_bias[run, a] - bias[run, a]
-        for i in range(start, stop):
-            if i == middle:
-                middle_attitude[:, :] = run_attitude
-                middle_velocity[:] = run_velocity
-                middle_position[:] = run_position
-            if i == stop - latency_samples:
-                _keep_fix(run_attitude, run_velocity, run_position, fix[run])
-            for a in range(3):
-                rate[a] = angular_rate[i, a] + residual_bias[a]
-                force[a] = specific_force[i, a] + residual_bias[3 + a]
-            if noisy:
-                for a in range(3):
-                    rate[a] += white_sample(true_noise[a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + a])
-                    force[a] += white_sample(
-                        true_noise[3 + a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + 3 + a]
-                    )
-            mechanize(run_attitude, run_velocity, run_position, rate, force, step[i], mean_force)
-            interval += step[i]
-        for a in range(3):
-            mean_force[a] /= interval
-        navigation_dynamics(middle_velocity, middle_position, mean_force, dynamics)
-        transition_matrix(dynamics, middle_attitude, interval, transition, work)
+        interval = mechanize_epoch(
+            boundaries[index[run]],
+            boundaries[index[run] + 1],
+            latency_samples,
+            residual_bias,
+            noise,
+            angular_rate,
+            specific_force,
+            step,
+            true_noise,
+            attitude[run],
+            velocity[run],
+            position[run],
+            fix[run],
+            mean_force,
+            transition,
+        )
         for i in range(NUM_STATES):
             half_noise[i, i] = 0.5 * interval * filter_density[i] * process_scale[run]
             covariance[run, i, i] += half_noise[i, i]
@@ -97,12 +84,82 @@ def propagate(
         if auxiliary.shape[1] > 0:
             kalman.predict_mean(transition, auxiliary[run], mean)
         if noisy:
-            _disturb_position(run_position, true_noise, np.sqrt(interval), noise[last:])
+            disturb_position(position[run], true_noise, np.sqrt(interval), noise[last:])
             _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, noise[last:])
         if latency_samples == 0:
-            _keep_fix(run_attitude, run_velocity, run_position, fix[run])
+            _keep_fix(attitude[run], velocity[run], position[run], fix[run])
         for a in range(3):
             fix[run, FORCE, a] = mean_force[a]
+
+
+@njit(cache=True, nogil=True)
+def mechanize_epoch(
+    start: int,
+    stop: int,
+    latency_samples: int,
+    residual_bias: Floats,
+    noise: Floats,
+    angular_rate: Floats,
+    specific_force: Floats,
+    step: Floats,
+    true_noise: Floats,
+    attitude: Floats,
+    velocity: Floats,
+    position: Floats,
+    fix: Floats,
+    mean_force: Floats,
+    transition: Floats,
+) -> float:
+    """Mechanize the inertial samples of an epoch of one run, and form the transition of its error over it.
+
+    Args:
+        start: first sample.
+        stop: the sample after the last.
+        latency_samples: before the end, when the fix is taken; 0 = not here.
+        residual_bias: what is left of the biases, (6,).
+        noise: normals of the epoch, six per sample first; (0,) where the samples have errors of their own.
+        angular_rate: of the true motion, (samples, 3).
+        specific_force: likewise.
+        step: of each sample, s.
+        true_noise: standard deviation density of what acts on the samples, (9,).
+        attitude: (3, 3), in place.
+        velocity: (3,), in place.
+        position: (3,), in place.
+        fix: the state kept when the fix is taken, (6, 3), in place.
+        mean_force: mean specific force in ENU, (3,), overwritten.
+        transition: first nine rows of Φ, (9, 15), overwritten.
+
+    Returns:
+        The length of the epoch, s.
+    """
+    rate, force = np.empty(3), np.empty(3)
+    middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
+    dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
+    noisy = noise.shape[0] > 0
+    middle = start + (stop - start) // 2
+    mean_force[:] = 0.0
+    interval = 0.0
+    for i in range(start, stop):
+        if i == middle:
+            middle_attitude[:, :] = attitude
+            middle_velocity[:] = velocity
+            middle_position[:] = position
+        if i == stop - latency_samples:
+            _keep_fix(attitude, velocity, position, fix)
+        for a in range(3):
+            rate[a] = angular_rate[i, a] + residual_bias[a]
+            force[a] = specific_force[i, a] + residual_bias[3 + a]
+        if noisy:
+            for a in range(3):
+                rate[a] += white_sample(true_noise[a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + a])
+                force[a] += white_sample(true_noise[3 + a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + 3 + a])
+        mechanize(attitude, velocity, position, rate, force, step[i], mean_force)
+        interval += step[i]
+    for a in range(3):
+        mean_force[a] /= interval
+    navigation_dynamics(middle_velocity, middle_position, mean_force, dynamics)
+    transition_matrix(dynamics, middle_attitude, interval, transition, work)
+    return interval
 
 
 @njit(cache=True, nogil=True)
@@ -115,7 +172,7 @@ def _keep_fix(attitude: Floats, velocity: Floats, position: Floats, fix: Floats)
 
 
 @njit(cache=True, nogil=True)
-def _disturb_position(position: Floats, true_noise: Floats, root: float, normals: Floats) -> None:
+def disturb_position(position: Floats, true_noise: Floats, root: float, normals: Floats) -> None:
     """The random walk of the navigation computation over an epoch."""
     latitude, longitude, height = enu_displacement(
         position[0],
@@ -231,16 +288,22 @@ def resolve(
     for run in runs:
         correction[:] = 0.0
         kalman.correct_error(gain[run], whitened[run], correction)
-        rotate(attitude[run], -correction[0], -correction[1], -correction[2])
-        for a in range(3):
-            velocity[run, a] += correction[3 + a]
-        latitude, longitude, height = enu_displacement(
-            position[run, 0], position[run, 1], position[run, 2], correction[6], correction[7], correction[8]
-        )
-        position[run, 0], position[run, 1], position[run, 2] = latitude, longitude, height
-        for a in range(6):
-            bias[run, a] -= correction[9 + a]
+        feed_back(correction, attitude[run], velocity[run], position[run], bias[run])
         kalman.update_covariance(gain[run], covariance[run])
+
+
+@njit(cache=True, nogil=True)
+def feed_back(correction: Floats, attitude: Floats, velocity: Floats, position: Floats, bias: Floats) -> None:
+    """Correct the inertial solution of one run by minus its estimated error, (15,) at least; the others in place."""
+    rotate(attitude, -correction[0], -correction[1], -correction[2])
+    for a in range(3):
+        velocity[a] += correction[3 + a]
+    latitude, longitude, height = enu_displacement(
+        position[0], position[1], position[2], correction[6], correction[7], correction[8]
+    )
+    position[0], position[1], position[2] = latitude, longitude, height
+    for a in range(6):
+        bias[a] -= correction[9 + a]
 
 
 @njit(cache=True, nogil=True)

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.tight_model import TightModel
 
 INERTIAL_SOLUTION = "inertial solution"
 LINEAR_MODEL = "linear model"
 ODOMETER = "odometer"
+RANGES = "ranges to satellites"
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class FilterFacts:
         fix_sigma: 1 sigma of a fix per horizontal axis, m; None = not told.
         auxiliary_sigma: 1 sigma of what the odometer's solution goes wrong in an epoch at the end of the game, m; None
             = there is no odometer.
+        tight_model: burn-in -> the model of the tightly coupled filter, every range used; None = it takes fixes.
     """
 
     scenario: str
@@ -35,6 +38,7 @@ class FilterFacts:
     model: Callable[[int], LinearModel]
     fix_sigma: float | None = None
     auxiliary_sigma: float | None = None
+    tight_model: Callable[[int], TightModel] | None = None
 
     def require(self, owner: str, needs: tuple[str, ...], remedy: str = "") -> None:
         """Refuse a part that needs something the scenario does not offer.

@@ -6,13 +6,14 @@ north, up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.navigation.position_domain import project_onto_position, whitened_axes
 from spoofgym.streams import RunStreams
 
 MANOEUVRE = 0.3
@@ -77,16 +78,62 @@ class Innovation:
     """The innovation of one epoch, whitened once: every test uses it.
 
     Attributes:
-        residual: z = p_INS - p_GNSS (and v_INS - v_GNSS), (N, m), m and m/s.
+        residual: z = p_INS - p_GNSS (and v_INS - v_GNSS), or predicted minus measured ranges, (N, m), m and m/s.
         covariance: S = H P H' + R, (N, m, m).
         whitened: L⁻¹ residual with S = L L', (N, m).
         nis: normalised innovation squared, whitened' whitened, (N,).
+        range_response: L⁻¹ H on the three states of the position, (N, m, 3), 1/m, where ranges are measured; None for
+            fixes of position.
+        present: whether each measurement is there, (N, m), where ranges are measured; None = all are.
     """
 
     residual: Floats
     covariance: Floats
     whitened: Floats
     nis: Floats
+    range_response: Floats | None = None
+    present: Flags | None = None
+
+    @cached_property
+    def response(self) -> Floats:
+        """L⁻¹ H on the three states of the position, (N, m, 3), 1/m; a fix of position observes them as they are."""
+        if self.range_response is not None:
+            return self.range_response
+        return whitened_axes(self.covariance)
+
+    @cached_property
+    def degrees(self) -> Runs:
+        """Measurements that are there, (N,): the degrees of freedom of `nis` under a matched filter."""
+        if self.present is None:
+            return np.full(self.whitened.shape[0], self.whitened.shape[1])
+        return np.add.reduce(self.present, axis=1, dtype=np.int64)
+
+    def put(self, runs: Runs, part: Innovation) -> Innovation:
+        """These innovations with those of some runs exchanged."""
+
+        def exchange(mine: Any, theirs: Any) -> Any:
+            if mine is None:
+                return None
+            whole = mine if mine.flags.writeable else mine.copy()
+            whole[runs] = theirs
+            return whole
+
+        return Innovation(*(exchange(getattr(self, item.name), getattr(part, item.name)) for item in fields(self)))
+
+    @cached_property
+    def in_position(self) -> Innovation:
+        """What the ranges say about the position alone, as the innovation of a fix of position, m = 3.
+
+        With A = H'S⁻¹H on the states of the position (Kujur 2024, eq 20, for all directions at once), the residual is
+        A⁻¹ H'S⁻¹ z, and A⁻¹ its covariance: the position that the ranges ask for by generalised least squares. It is
+        zero where fewer than three directions are observed. A fix of position is left as it is.
+        """
+        if self.range_response is None:
+            return self
+        n = len(self.nis)
+        residual, covariance, whitened, nis = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3)), np.empty(n)
+        project_onto_position(self.range_response, self.whitened, residual, covariance, whitened, nis)
+        return Innovation(residual, covariance, whitened, nis)
 
 
 @dataclass(frozen=True)
@@ -105,6 +152,31 @@ class Epoch(Clock):
     available: Flags | None = None
     view: FilterView | None = None
 
+    @cached_property
+    def in_position(self) -> Epoch:
+        """The same epoch as seen by a test of the position: the innovation of `Innovation.in_position`."""
+        innovation = self.innovation.in_position
+        return self if innovation is self.innovation else replace(self, innovation=innovation)
+
+
+@dataclass(frozen=True)
+class Spoof:
+    """What a spoofer makes the receivers believe at an epoch.
+
+    Attributes:
+        offset: of the position, (N, 3), m ENU.
+        rate: what is added to the velocity, (N, 3), m/s ENU; its own rate in a consistent attack.
+        clock: offset of the receiver's clock, (N,), m. A receiver of fixes solves for its clock and does not show it.
+        clock_rate: its rate, (N,), m/s.
+        satellites: slots whose signal the receiver takes from the spoofer, (N, S); None = all.
+    """
+
+    offset: Floats
+    rate: Floats
+    clock: Floats
+    clock_rate: Floats
+    satellites: Flags | None = None
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -118,12 +190,14 @@ class Decision:
         reset: the filter's position jumps to the fix (its velocity, too, where the receiver gives one) and has this
             variance per axis afterwards, (N,), m²; 0 = no reset, None = none in any run.
         noise_scale: factor on the variance R of the fix, (N,); None = 1 in every run.
+        satellites: which slots' ranges to apply where the fix is used, (N, S); None = all.
     """
 
     use: Flags
     backtrack: Runs | None = None
     reset: Floats | None = None
     noise_scale: Floats | None = None
+    satellites: Flags | None = None
 
     def of(self, runs: Runs) -> Decision:
         """The decisions of some runs only."""
@@ -132,6 +206,7 @@ class Decision:
             None if self.backtrack is None else self.backtrack[runs],
             None if self.reset is None else self.reset[runs],
             None if self.noise_scale is None else self.noise_scale[runs],
+            None if self.satellites is None else self.satellites[runs],
         )
 
     def put(self, runs: Runs, part: Decision) -> Decision:
@@ -142,8 +217,9 @@ class Decision:
         def exchange(mine: Any, theirs: Any, absent: float) -> Any:
             if mine is None and theirs is None:
                 return None
-            kind = np.result_type(*(value for value in (mine, theirs) if value is not None))
-            whole = np.full(len(use), absent, dtype=kind) if mine is None else mine.astype(kind)
+            present = [value for value in (mine, theirs) if value is not None]
+            kind, shape = np.result_type(*present), (len(use), *present[0].shape[1:])
+            whole = np.full(shape, absent, dtype=kind) if mine is None else mine.astype(kind)
             whole[runs] = absent if theirs is None else theirs
             return whole
 
@@ -152,6 +228,7 @@ class Decision:
             exchange(self.backtrack, part.backtrack, 0),
             exchange(self.reset, part.reset, 0.0),
             exchange(self.noise_scale, part.noise_scale, 1.0),
+            exchange(self.satellites, part.satellites, True),
         )
 
 
@@ -234,6 +311,23 @@ class Navigator(Protocol):
         """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
 
 
+class RangeNavigator(Navigator, Protocol):
+    """A navigator on ranges, which shows monitors more of its filters."""
+
+    shared_gains: bool
+    """Every run uses every range, with the gains of the model."""
+    auxiliary: Floats
+    """The fifteen inertial states of the unaided solution minus those of the filter, (N, 15); (N, 0) undemanded."""
+
+    @property
+    def inertial_covariance(self) -> Floats:
+        """The filter's covariance of the inertial states before the ranges of the present epoch, (N, 15, 15)."""
+
+    @property
+    def position_gain(self) -> Floats:
+        """U' of the position for the ranges of the present epoch, (N, m, 3), m."""
+
+
 class FilterView:
     """What the filter of some runs knows beside its innovation, before the present fix is resolved; never the truth.
 
@@ -268,3 +362,32 @@ class FilterView:
             RuntimeError: nobody demanded an unaided solution.
         """
         return self._navigator.auxiliary_offset[self._runs]
+
+    @cached_property
+    def backtracked(self) -> Runs:
+        """Epochs that the `resolve` before the present epoch took back, (N,)."""
+        return self._navigator.backtracked[self._runs]
+
+    @property
+    def _on_ranges(self) -> RangeNavigator:
+        return cast(RangeNavigator, self._navigator)
+
+    @property
+    def shared_gains(self) -> bool:
+        """Whether every run uses every range, with the gains of the model; of a filter on ranges."""
+        return self._on_ranges.shared_gains
+
+    @cached_property
+    def auxiliary(self) -> Floats:
+        """Inertial states of the unaided solution minus those of the filter, (N, 15); of a filter on ranges."""
+        return self._on_ranges.auxiliary[self._runs]
+
+    @cached_property
+    def inertial_covariance(self) -> Floats:
+        """The filter's covariance of the inertial states, (N, 15, 15); of a filter on ranges."""
+        return self._on_ranges.inertial_covariance[self._runs]
+
+    @cached_property
+    def position_gain(self) -> Floats:
+        """U' of the position for the present ranges, (N, m, 3), m; of a filter on ranges."""
+        return self._on_ranges.position_gain[self._runs]

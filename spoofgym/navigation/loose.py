@@ -80,7 +80,7 @@ class StrapdownNavigator:
         self._noise_row = self.index
         self._process_scale = np.ones(num_runs)
         # what a resolved epoch leaves, in the order of the rings
-        self._resolved = (
+        self._resolved: tuple[Floats, ...] = (
             self.attitude,
             self.velocity,
             self.position,
@@ -89,7 +89,7 @@ class StrapdownNavigator:
             self._instability,
             self.covariance,
         )
-        self._past = tuple(np.zeros((num_runs, slots, *part.shape[1:])) for part in self._resolved)
+        self._past: tuple[Floats, ...] = tuple(np.zeros((num_runs, slots, *part.shape[1:])) for part in self._resolved)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0.
@@ -230,7 +230,11 @@ class StrapdownNavigator:
             used = used & ~jumps
         self._correct(runs[used])
         if before is not None:
-            self.auxiliary[runs] += _difference(before, self._solution(runs))
+            self._move_auxiliary(runs, before)
+
+    def _move_auxiliary(self, runs: Runs, before: tuple[Floats, Floats, Floats, Floats]) -> None:
+        """Let the unaided solution stay where it is while the filter's has moved."""
+        self.auxiliary[runs] += _difference(before, self._solution(runs))
 
     def _correct(self, runs: Runs) -> None:
         """Apply the present fix."""

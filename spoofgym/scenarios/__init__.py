@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.foi_drive import foi_drive
+from spoofgym.scenarios.kujur_flight import kujur_flight
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.shadmehri_flight import shadmehri_flight
@@ -15,6 +16,7 @@ from spoofgym.specification import build
 
 SCENARIOS: dict[str, Callable[..., Scenario]] = {
     "foi-drive": foi_drive,
+    "kujur-flight": kujur_flight,
     "liu-flight": liu_flight,
     "recorded": recorded,
     "shadmehri-flight": shadmehri_flight,

@@ -11,10 +11,14 @@ from functools import lru_cache
 
 from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.scenario import SimulatedScenario
+from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade
-from spoofgym.sensors.receiver import Receiver
+from spoofgym.sensors.range_fix import MASK, range_fix_along
+from spoofgym.sensors.ranging import LIU
+from spoofgym.sensors.receiver import ZERO, Receiver
 from spoofgym.specification import spell
+from spoofgym.tight_scenario import TightScenario
 from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly
 
 LIU_END = (math.radians(34.6887), math.radians(108.1915), 2283.0)
@@ -37,6 +41,10 @@ LIU_MANOEUVRES = (
     Straight(330.0),
 )
 """Turns begin at 150, 330, 480 and 680 s; from 770 s straight and level, north at 150 m/s."""
+
+DRAG_OFF_RATE = (4.0, 4.0, 4.0)
+NOISES = ("white", "ranges")
+COUPLINGS = ("loose", "tight")
 
 
 def liu_trajectory() -> Trajectory:
@@ -61,12 +69,15 @@ def liu_flight(
     markov_sigma: float = 0.0,
     markov_time: float = 0.0,
     sigma: float = 3.7,
-) -> SimulatedScenario:
-    """The Liu flight: aviation-grade INS, single-frequency GPS whose white noise has the filter's own R.
+    noise: str = "white",
+    coupling: str = "loose",
+) -> Scenario:
+    """The Liu flight: aviation-grade INS and a single-frequency GPS receiver.
 
     Settings of the filter: Liu 2018, table 1 and appendix D. The position random walk that the filter believes in (1
-        m/√h) really acts on
-    the INS, so that the filter is matched. Liu's range errors are of a later scenario; here R is white.
+    m/√h) really acts on the INS. By default the noise of the fixes is white with the filter's own R, so that the filter
+    is matched; with ``noise=ranges`` fixes are made from the ranges to the 24-slot constellation, which starts at
+    00:00:00 on 1 July 1993, with the errors of table 1, and the filter keeps its R.
 
     Args:
         horizon: epochs of the game.
@@ -76,38 +87,96 @@ def liu_flight(
         markov_sigma: first-order Gauss-Markov receiver noise in the horizontal axes, m; the vertical has R's ratio;
             unknown to the filter.
         markov_time: its correlation time, s.
-        sigma: white noise of the fix per horizontal axis, m, the receiver's and the filter's alike; the vertical keeps
-            the paper's ratio, 6 / 3.7.
+        sigma: the filter's R and the white noise of the fix per horizontal axis, m; the vertical keeps the paper's
+            ratio, 6 / 3.7.
+        noise: of the fixes: ``white``, or ``ranges``.
+        coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of every range itself, with the
+            errors of table 1.
 
     Raises:
-        ValueError: an unknown IMU, a number out of range, or a game outside the flight.
+        ValueError: an unknown name, a number out of range, a game outside the flight, or options that do not go
+            together.
     """
-    horizontal = validation.above("liu-flight", "sigma", sigma)
-    white = (horizontal, horizontal, 6.0 * (horizontal / 3.7))
+    owner = "liu-flight"
+    validation.one_of(owner, "noise", noise, NOISES)
+    validation.one_of(owner, "coupling", coupling, COUPLINGS)
+    validation.above(owner, "sigma", sigma)
+    coloured = markov_sigma != 0.0 or markov_time != 0.0
+    name = spell(
+        owner,
+        horizon=None if horizon == 120 else horizon,
+        onset=None if onset == 800.0 else onset,
+        rate=None if rate == 1.0 else rate,
+        imu=None if imu == "navigation" else imu,
+        markov_sigma=markov_sigma or None,
+        markov_time=markov_time or None,
+        sigma=None if sigma == 3.7 else sigma,
+        noise=None if noise == "white" else noise,
+        coupling=None if coupling == "loose" else coupling,
+    )
+    if coupling == "tight":
+        if noise != "white" or coloured or sigma != 3.7:
+            raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
+        return _tight(name, horizon, onset, rate, imu)
+    if noise == "ranges" and coloured:
+        raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
+    return _loose(name, horizon, onset, rate, imu, markov_sigma, markov_time, sigma, noise)
+
+
+def _loose(
+    name: str,
+    horizon: int,
+    onset: float,
+    rate: float,
+    imu: str,
+    markov_sigma: float,
+    markov_time: float,
+    sigma: float,
+    noise: str,
+) -> SimulatedScenario:
+    white = (sigma, sigma, 6.0 * (sigma / 3.7))
+    receiver = Receiver(
+        rate=rate,
+        white_sigma=white,
+        markov_sigma=(markov_sigma, markov_sigma, markov_sigma * white[2] / white[0]),
+        markov_time=markov_time,
+    )
+    ranges = None
+    if noise == "ranges":
+        receiver = Receiver(rate=rate, white_sigma=ZERO)
+        ranges = range_fix_along(LIU, gps_24(), _trajectory(), rate)
     return SimulatedScenario(
-        name=spell(
-            "liu-flight",
-            horizon=None if horizon == 120 else horizon,
-            onset=None if onset == 800.0 else onset,
-            rate=None if rate == 1.0 else rate,
-            imu=None if imu == "navigation" else imu,
-            markov_sigma=markov_sigma or None,
-            markov_time=markov_time or None,
-            sigma=None if sigma == 3.7 else sigma,
-        ),
+        name=name,
         trajectory=_trajectory(),
         grade=grade(imu),
-        receiver=Receiver(
-            rate=rate,
-            white_sigma=white,
-            markov_sigma=(markov_sigma, markov_sigma, markov_sigma * white[2] / white[0]),
-            markov_time=markov_time,
-        ),
+        receiver=receiver,
         tuning=FilterTuning(measurement_sigma=white),
         onset=onset,
         horizon=horizon,
-        drag_off_rate=(4.0, 4.0, 4.0),
+        drag_off_rate=DRAG_OFF_RATE,
         error_scale=10.0,
         defender_scale=50.0,
         true_position_random_walk=FilterTuning().position_random_walk,
+        ranges=ranges,
+    )
+
+
+def _tight(name: str, horizon: int, onset: float, rate: float, imu: str) -> TightScenario:
+    return TightScenario(
+        name=name,
+        trajectory=_trajectory(),
+        grade=grade(imu),
+        errors=LIU,
+        constellation=gps_24(),
+        start_time=0.0,
+        rate=rate,
+        mask=MASK,
+        tuning=FilterTuning(),
+        onset=onset,
+        horizon=horizon,
+        drag_off_rate=DRAG_OFF_RATE,
+        clock_rate=DRAG_OFF_RATE[0],
+        error_scale=10.0,
+        alert_limits=Scenario.alert_limits,
+        observable="rate",
     )

@@ -6,11 +6,9 @@ converted here, at the door; everything behind works in east-north-up, right-for
 
 from __future__ import annotations
 
-import gzip
 import math
 import sys
-import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from spoofgym.arrays import Floats
 from spoofgym.geodesy import displace, position_difference
+from spoofgym.scenarios.mounting import find_delay, find_mounting
+from spoofgym.scenarios.table import check_increasing, has_table, read_table, table_path
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -73,7 +73,7 @@ class Log:
         imu_time: of the inertial samples, (n,), s, increasing, the IMU's delay subtracted.
         angular_rate: body R, F, U, (n, 3), rad/s.
         specific_force: the same, m/s².
-        fixes: of the receiver, their delay subtracted.
+        fixes: of the receiver, their delay, stated or found, subtracted.
         reference: solution to compare with; None = the log has none.
     """
 
@@ -113,25 +113,30 @@ def interpolate(solution: Fixes, time: Floats) -> tuple[Floats, Floats]:
 def read_log(folder: str | Path) -> Log:
     """Read and check a log.
 
+    Where the mounting is unknown it is found from the whole drive, and the bias of the gyro at a standstill taken away;
+    so is the delay of the fixes, unless the log states one.
+
     Args:
         folder: holds ``log.toml``, ``imu.csv``, ``gnss.csv`` and perhaps ``reference.csv``; tables may be gzipped
             (``.csv.gz``).
 
     Raises:
         ValueError: a file or column is missing, a value is not a finite number or out of range, time does not increase
-            (each with file name, and line where there is one), the mounting is unknown, or IMU, fixes and ``start_s``
-            do not overlap.
+            (each with file name, and line where there is one), IMU, fixes and ``start_s`` do not overlap, or an unknown
+            mounting cannot be found.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"log {str(folder)!r} is no folder; a log is a folder with log.toml, imu.csv and gnss.csv")
     notes = _read_notes(folder / "log.toml")
     name = notes.get("name", folder.name)
-    mounting = _ENU_OF_NED @ _mounting(folder / "log.toml", notes)
+    mounting = _mounting(folder / "log.toml", notes)
     start = _number(folder / "log.toml", notes, "start_s", None)
 
-    path = _table_path(folder, "imu")
-    imu = _read_table(path, [IMU_COLUMNS], [])
+    path = table_path(folder, "imu")
+    imu = read_table(path, [IMU_COLUMNS], [], LIMITS)
+    check_increasing(path, imu["t_s"])
+    rate = np.column_stack([imu[column] for column in IMU_COLUMNS[1:4]])
     force = np.column_stack([imu[column] for column in IMU_COLUMNS[4:]])
     magnitude = float(np.median(np.linalg.norm(force, axis=1)))
     if not PLAUSIBLE_FORCE[0] <= magnitude <= PLAUSIBLE_FORCE[1]:
@@ -143,13 +148,33 @@ def read_log(folder: str | Path) -> Log:
         folder=folder,
         start=start,
         imu_time=imu["t_s"] - _number(folder / "log.toml", notes, "imu_delay_s", 0.0),
-        angular_rate=np.column_stack([imu[column] for column in IMU_COLUMNS[1:4]]) @ mounting.T,
-        specific_force=force @ mounting.T,
-        fixes=_read_fixes(_table_path(folder, "gnss"), _number(folder / "log.toml", notes, "gnss_delay_s", 0.0)),
-        reference=_read_fixes(_table_path(folder, "reference"), 0.0) if _has_table(folder, "reference") else None,
+        angular_rate=rate,
+        specific_force=force,
+        fixes=_read_fixes(table_path(folder, "gnss"), _number(folder / "log.toml", notes, "gnss_delay_s", 0.0)),
+        reference=_read_fixes(table_path(folder, "reference"), 0.0) if has_table(folder, "reference") else None,
     )
     _check_overlap(log)
-    return log
+    if mounting is not None:
+        return _turned(log, mounting, np.zeros(3))
+    if "gnss_delay_s" not in notes:
+        delay = find_delay(*_motion(log))
+        log = replace(log, fixes=replace(log.fixes, time=log.fixes.time - delay))
+    found = find_mounting(*_motion(log))
+    return _turned(log, found.rotation, found.gyro_bias)
+
+
+def _motion(log: Log) -> tuple[str, Floats, Floats, Floats, Floats, Floats]:
+    """What tells the mounting, from the log's start on."""
+    owner, after = f"log {str(log.folder)!r}", log.fixes.time >= log.start
+    fix_time, velocity = log.fixes.time[after], velocity_of(log.fixes)[after]
+    return owner, log.imu_time, log.angular_rate, log.specific_force, fix_time, velocity
+
+
+def _turned(log: Log, rotation: Floats, gyro_bias: Floats) -> Log:
+    """The log with its samples turned from sensor axes to body right, forward, up."""
+    return replace(
+        log, angular_rate=(log.angular_rate - gyro_bias) @ rotation.T, specific_force=log.specific_force @ rotation.T
+    )
 
 
 def _check_overlap(log: Log) -> None:
@@ -184,11 +209,17 @@ def _number(path: Path, notes: dict[str, Any], key: str, default: float | None) 
     return float(value)
 
 
-def _mounting(path: Path, notes: dict[str, Any]) -> Floats:
-    """Rotation from sensor axes to body forward-right-down, (3, 3)."""
-    value = notes.get("imu_to_body_frd", [])
+def _mounting(path: Path, notes: dict[str, Any]) -> Floats | None:
+    """Rotation from sensor axes to body right, forward, up, (3, 3); None = unknown.
+
+    Raises:
+        ValueError: the key is missing, or its value is no rotation.
+    """
+    if "imu_to_body_frd" not in notes:
+        raise ValueError(f"{path}: imu_to_body_frd is missing; where the mounting is unknown it must be [], empty")
+    value = notes["imu_to_body_frd"]
     if value == []:
-        raise ValueError(f"{path}: imu_to_body_frd is empty: a log with unknown mounting is not supported yet")
+        return None
     message = (
         f"{path}: imu_to_body_frd must be a rotation, 3 rows of 3 numbers (body forward, right, down), got {value!r}"
     )
@@ -202,24 +233,13 @@ def _mounting(path: Path, notes: dict[str, Any]) -> Floats:
     rotation: Floats = left @ right
     if np.any(np.abs(scale - 1.0) > ROTATION_TOLERANCE) or np.linalg.det(rotation) < 0.0:
         raise ValueError(message)
-    return rotation
-
-
-def _has_table(folder: Path, name: str) -> bool:
-    return (folder / f"{name}.csv").is_file() or (folder / f"{name}.csv.gz").is_file()
-
-
-def _table_path(folder: Path, name: str) -> Path:
-    present = [path for path in (folder / f"{name}.csv", folder / f"{name}.csv.gz") if path.is_file()]
-    if not present:
-        raise ValueError(f"{folder / name}.csv (or .csv.gz) is missing")
-    if len(present) == 2:
-        raise ValueError(f"{folder}: {present[0].name} and {present[1].name} are both there; keep one")
-    return present[0]
+    return np.asarray(_ENU_OF_NED @ rotation)
 
 
 def _read_fixes(path: Path, delay: float) -> Fixes:
-    table = _read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS, VELOCITY_SIGMA_COLUMNS])
+    optional: list[tuple[str, ...]] = [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS, VELOCITY_SIGMA_COLUMNS]
+    table = read_table(path, [POSITION_COLUMNS], optional, LIMITS)
+    check_increasing(path, table["t_s"])
     position = np.column_stack([np.radians(table["lat_deg"]), np.radians(table["lon_deg"]), table["h_m"]])
 
     def enu(columns: tuple[str, ...], matrix: Floats) -> Floats | None:
@@ -234,72 +254,3 @@ def _read_fixes(path: Path, delay: float) -> Fixes:
         position_sigma=enu(POSITION_SIGMA_COLUMNS, np.abs(_ENU_OF_NED)),
         velocity_sigma=enu(VELOCITY_SIGMA_COLUMNS, np.abs(_ENU_OF_NED)),
     )
-
-
-def _read_table(path: Path, required: list[tuple[str, ...]], optional: list[tuple[str, ...]]) -> dict[str, Floats]:
-    """Columns of a CSV file by their names; each optional group is there as a whole or not at all."""
-    lines = _lines(path)
-    header = [name.strip() for name in lines[0].split(",")] if lines else []
-    wanted: list[str] = []
-    for group in required + optional:
-        missing = [name for name in group if name not in header]
-        if missing and (group in required or len(missing) < len(group)):
-            raise ValueError(
-                f"{path}, line 1: column {missing[0]!r} is missing; needed together: {', '.join(group)}; "
-                f"found: {', '.join(header) or 'nothing'}"
-            )
-        if not missing:
-            wanted += group
-    twice = [name for name in wanted if header.count(name) > 1]
-    if twice:
-        raise ValueError(f"{path}, line 1: column {twice[0]!r} is there twice")
-    if len(lines) < 3:
-        raise ValueError(f"{path}: needs two lines of data or more below the header")
-    places = [header.index(name) for name in wanted]
-    try:
-        values = np.loadtxt(lines[1:], delimiter=",", usecols=places, comments=None, ndmin=2)
-    except ValueError:
-        values = None
-    if values is None or len(values) != len(lines) - 1 or not np.all(np.isfinite(values)):
-        raise _bad_value(path, lines, wanted, places)
-    for column, name in enumerate(wanted):
-        low, high = LIMITS.get(name, (-math.inf, math.inf))
-        wrong = np.flatnonzero((values[:, column] < low) | (values[:, column] > high))
-        if len(wrong):
-            bounds = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
-            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {values[wrong[0], column]:g}")
-    late = np.flatnonzero(np.diff(values[:, 0]) <= 0.0)
-    if len(late):
-        before, after = values[late[0], 0], values[late[0] + 1, 0]
-        raise ValueError(f"{path}, line {late[0] + 3}: t_s must increase, got {after:.9g} after {before:.9g}")
-    return {name: np.ascontiguousarray(values[:, column]) for column, name in enumerate(wanted)}
-
-
-def _lines(path: Path) -> list[str]:
-    """Lines of a plain or gzipped text file, without blank ones at its end."""
-    data = path.read_bytes()
-    try:
-        if path.suffix == ".gz":
-            data = gzip.decompress(data)
-        text = data.decode("utf-8-sig")
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read: {error}") from None
-    return text.rstrip().splitlines()
-
-
-def _bad_value(path: Path, lines: list[str], wanted: list[str], places: list[int]) -> ValueError:
-    """The error that names the first line with a value that is not a finite number."""
-    for number, line in enumerate(lines[1:], start=2):
-        cells = line.split(",")
-        for name, place in zip(wanted, places, strict=True):
-            if place >= len(cells):
-                return ValueError(f"{path}, line {number}: {name} is missing, the line has {len(cells)} of the columns")
-            try:
-                valid = math.isfinite(float(cells[place])) and "_" not in cells[place]
-            except ValueError:
-                valid = False
-            if not valid:
-                return ValueError(
-                    f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()!r}"
-                )
-    return ValueError(f"{path}: cannot be read as a table of numbers")

@@ -17,7 +17,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION
-from spoofgym.navigation.interface import Decision, Demands, Timeline
+from spoofgym.navigation.interface import Demands, Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose import StrapdownNavigator
 from spoofgym.navigation.strapdown_model import StrapdownModel
@@ -26,16 +26,22 @@ from spoofgym.navigation.warm_start import ERROR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.alignment import Alignment, align
+from spoofgym.scenarios.clean_run import CleanRun, clean_run
 from spoofgym.scenarios.log import Log, interpolate, read_log, velocity_of
+from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
 
+FIXES = ("phone", "ranges")
+"""Which fixes a filter may take: those in the log, or those made from its raw ranges."""
 MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""
 SIGMA_FLOOR = 0.3
 """Smallest 1 sigma that the filter believes of a fix, m and m/s: timing and lever arm are not known better."""
+UNMEASURED_SIGMA = 1e3
+"""1 sigma of a vertical velocity that is 0 in every fix, m/s: the receiver fills the column without measuring it."""
 DEFAULT_SIGMA = (2.5, 2.5, 5.0, 0.3, 0.3, 0.5)
 """1 sigma of a fix whose log states none, m and m/s."""
 ALIGNMENT_SIGMA = (math.radians(5.0), math.radians(5.0), math.radians(10.0))
@@ -45,25 +51,6 @@ NOISE_FACTOR = 20.0
 """The filter's white inertial noise over the data sheet's, for what its model leaves out (presumably scale factor,
 misalignment, vibration). An empirical figure: chosen by the clean errors of four logs, on which it is therefore not
 an independent result, and cautious there (mean NIS well below the fix's dimension)."""
-
-
-@dataclass(frozen=True, eq=False)
-class CleanRun:
-    """The filter's states on unspoofed fixes; row 0 is the alignment, row k + 1 the state after epoch k was used.
-
-    Attributes:
-        attitude: body to ENU, (E + 1, 3, 3).
-        velocity: ENU, (E + 1, 3), m/s.
-        position: latitude rad, longitude rad, height m, (E + 1, 3).
-        bias: estimated, (E + 1, 6), rad/s and m/s².
-        covariance: P, (E + 1, 15, 15).
-    """
-
-    attitude: Floats
-    velocity: Floats
-    position: Floats
-    bias: Floats
-    covariance: Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,7 +135,8 @@ class RecordedScenario(Scenario):
         time = self.epoch_time
         onset = self.onset
         if onset is None:
-            onset = self.log.start + (time[-1] - self.log.start) / 3.0
+            begin = max(self.log.start, self.log.fixes.time[0])
+            onset = begin + (time[-1] - begin) / 3.0
             onset = min(max(onset, time[0]), time[-2])
         if not time[0] <= onset < time[-1]:
             raise ValueError(
@@ -241,27 +229,15 @@ class RecordedScenario(Scenario):
             if place < self.dimension:
                 default = np.broadcast_to(self.tuning.measurement_sigma[place : place + 3], size)
                 columns.append(default if stated is None else stated[self._fix])
-        return np.maximum(np.hstack(columns), self.sigma_floor)
+        sigma = np.maximum(np.hstack(columns), self.sigma_floor)
+        if fixes.velocity is not None and not fixes.velocity[:, 2].any():
+            sigma[:, 5:] = UNMEASURED_SIGMA
+        return sigma
 
     @cached_property
     def clean(self) -> CleanRun:
         """The filter on the unspoofed fixes, from the alignment to the end of the log."""
-        navigator = StrapdownNavigator(self.model, 1, RunSlices(1))
-        navigator.reset(np.array([0]), np.zeros((1, NUM_JOINT)), RunStreams.from_seed(0, 1))
-        use = Decision(np.ones(1, dtype=bool))
-        states: list[tuple[Floats, ...]] = []
-
-        def keep() -> None:
-            parts = (navigator.attitude, navigator.velocity, navigator.position, navigator.bias, navigator.covariance)
-            states.append(tuple(part[0].copy() for part in parts))
-
-        keep()
-        for _ in range(len(self.epoch_time)):
-            navigator.propagate()
-            navigator.innovate(np.zeros((1, self.dimension)))
-            navigator.resolve(use)
-            keep()
-        run = CleanRun(*(np.stack(part) for part in zip(*states, strict=True)))
+        run = clean_run(self.model)
         if not np.all(np.isfinite(run.position)):
             raise ValueError(
                 f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade"
@@ -355,6 +331,7 @@ def recorded(
     velocity: bool | None = None,
     sigma_floor: float = SIGMA_FLOOR,
     noise_factor: float = NOISE_FACTOR,
+    fixes: str = FIXES[0],
 ) -> RecordedScenario:
     """A log in the project's format as a game.
 
@@ -367,10 +344,12 @@ def recorded(
         velocity: whether the filter uses the receiver's velocity beside its position; None = where the log has it.
         sigma_floor: smallest 1 sigma of a fix that the filter believes, m and m/s.
         noise_factor: the filter's white inertial noise over the data sheet's.
+        fixes: which ones the filter takes: ``phone``, those in the log, whatever receiver made them, or ``ranges``,
+            least squares of the log's raw ranges (`range_fixes`).
 
     Raises:
-        ValueError: a path with a comma, an unknown grade, a log that cannot be used, an onset or a horizon outside it,
-            or a number that is not positive.
+        ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
+            horizon outside it, or a number that is not positive.
     """
     path = str(Path(path))
     if "," in path:
@@ -380,7 +359,10 @@ def recorded(
         onset = validation.finite("recorded", "onset", onset)
     sigma_floor = validation.above("recorded", "sigma_floor", sigma_floor)
     noise_factor = validation.above("recorded", "noise_factor", noise_factor)
+    fixes = validation.one_of("recorded", "fixes", fixes, FIXES)
     log = read_log(path)
+    if fixes == "ranges":
+        log = replace(log, fixes=range_fixes(log))
     uses_velocity = log.fixes.velocity is not None if velocity is None else velocity
     options = {
         "grade": (grade, "automotive"),
@@ -389,6 +371,7 @@ def recorded(
         "velocity": (velocity, None),
         "sigma_floor": (sigma_floor, SIGMA_FLOOR),
         "noise_factor": (noise_factor, NOISE_FACTOR),
+        "fixes": (fixes, FIXES[0]),
     }
     return RecordedScenario(
         name=spell("recorded", path, **{key: value for key, (value, default) in options.items() if value != default}),

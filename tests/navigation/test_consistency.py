@@ -14,8 +14,11 @@ from scipy.stats import chi2
 from spoofgym.geodesy import position_difference
 from spoofgym.navigation.warm_start import ERROR
 from spoofgym.scenarios.liu_flight import liu_flight
+from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade
-from spoofgym.sensors.receiver import Receiver
+from spoofgym.sensors.range_fix import range_fix_along
+from spoofgym.sensors.ranging import KUJUR
+from spoofgym.sensors.receiver import ZERO, Receiver
 from spoofgym.simulation import Simulation
 
 pytestmark = pytest.mark.xdist_group("consistency")  # one worker: the fixtures are played once
@@ -149,7 +152,18 @@ def test_the_band_sees_a_lever_arm_that_the_filter_does_not_know():
     assert np.sum(nis) / degrees > band(degrees)[1]
 
 
+def rising():
+    """Fixes from ranges, two of whose satellites give way to others after half a minute."""
+    noise = range_fix_along(KUJUR, gps_24(), liu_flight().trajectory, 1.0)
+    slots = noise.white.shape[2]
+    started = noise.started.copy()
+    for slot in (1, 3):
+        started[30 + slot, [slot, slot + slots, slot + 2 * slots]] = True
+    return dataclasses.replace(noise, started=started)
+
+
 MISMATCHED = {
+    "ranges": {"receiver": Receiver(white_sigma=ZERO), "ranges": rising()},
     "coloured": {"receiver": Receiver(white_sigma=(1.0, 1.0, 2.0), markov_sigma=(3.0, 2.0, 4.0), markov_time=60.0)},
     "tactical": {"grade": grade("tactical")},
     "both": {

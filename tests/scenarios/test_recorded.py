@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -12,8 +13,9 @@ import pytest
 import spoofgym  # noqa: F401
 from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
-from spoofgym.geodesy import displace
+from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios import make_scenario
+from spoofgym.scenarios.log import interpolate, read_log
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.simulation import Simulation
 from spoofgym.trajectory import Straight, Turn, fly
@@ -24,7 +26,7 @@ RATE = 50
 IMU_HEADER = "t_s,gx_radps,gy_radps,gz_radps,ax_mps2,ay_mps2,az_mps2"
 GNSS_HEADER = "t_s,lat_deg,lon_deg,h_m,vn_mps,ve_mps,vd_mps"
 SIGMAS = ",sd_n_m,sd_e_m,sd_d_m"
-DATA = Path(__file__).parents[3] / "shared" / "data"
+PHONE = Path(__file__).parents[3] / "shared" / "data" / "car-phone-raw"
 
 
 def rows(columns: list[np.ndarray]) -> str:
@@ -224,7 +226,36 @@ def test_a_wrong_mounting_is_refused(folder: Path, tmp_path: Path) -> None:
         recorded(str(other))
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data, real logs for tests, is absent")
-def test_a_phone_of_unknown_mounting_is_refused() -> None:
-    with pytest.raises(ValueError, match="unknown mounting is not supported yet"):
-        recorded(str(DATA / "car-phone-raw"))
+def test_fixes_from_ranges_need_ranges(folder: Path) -> None:
+    assert recorded(str(folder), fixes="phone").name == recorded(str(folder)).name
+    with pytest.raises(ValueError, match=r"has no ranges \(ranges.csv, ephemeris.csv\)"):
+        recorded(str(folder), fixes="ranges")
+    with pytest.raises(ValueError, match="fixes must be one of phone, ranges, got 'rtk'"):
+        recorded(str(folder), fixes="rtk")
+
+
+def test_a_vertical_velocity_of_zero_throughout_is_not_believed(folder: Path) -> None:
+    level = recorded(str(folder))
+    assert level.log.fixes.velocity is not None
+    rising = replace(level.log.fixes, velocity=level.log.fixes.velocity + np.array([0.0, 0.0, 0.1]))
+    sigma = [
+        np.sqrt(np.diagonal(scenario.model.measurement_covariance, axis1=1, axis2=2))
+        for scenario in (level, replace(level, log=replace(level.log, fixes=rising)))
+    ]
+    assert (sigma[0][:, 5] >= 100.0).all()
+    assert (sigma[1][:, 5] < 1.0).all()
+    np.testing.assert_array_equal(sigma[0][:, :5], sigma[1][:, :5])
+
+
+@pytest.mark.skipif(not PHONE.is_dir(), reason="../shared/data, real logs for tests, is absent")
+@pytest.mark.parametrize("fixes", ["phone", "ranges"])
+def test_a_phone_of_unknown_mounting(fixes: str) -> None:
+    """The filter stays within metres of the phone's own fixes in the median, whichever fixes it takes."""
+    scenario = recorded(str(PHONE), fixes=fixes)
+    assert make_scenario(f"recorded:{PHONE},fixes={fixes}").name == scenario.name
+    phone = read_log(PHONE).fixes
+    gap = np.flatnonzero(np.diff(phone.time) > 1.5)
+    inside = (scenario.epoch_time > phone.time[gap[0] + 1] + 30.0) & (scenario.epoch_time < phone.time[gap[1]])
+    place, _ = interpolate(phone, scenario.epoch_time[inside])
+    error = position_difference(scenario.clean.position[1:][inside], place)
+    assert np.median(np.hypot(error[:, 0], error[:, 1])) < 4.0

@@ -1,0 +1,115 @@
+"""Solutions that coast on inertia from every past epoch, beside the filter that uses ranges: all of them at once.
+
+The coasting that departs from the filter after epoch j obeys the same Φ and Q as every other. Brought back to a common
+origin by C_k = Φ_k C_(k-1), the difference to a solution that has never been corrected, and what the covariance is
+beyond that of pure process noise, Γ_k = Φ_k Γ_(k-1) Φ_k' + Q_k,
+
+    E_k = C_k⁻¹ (x_KF - x_unaided),        M_k = C_k⁻¹ (P_k - Γ_k) C_k⁻ᵀ,
+
+change at a correction only: -C_k⁻¹ U_k w_k and -C_k⁻¹ U_k U_k' C_k⁻ᵀ. A coasting keeps those of its departure. So along a
+direction u, with b_k = C_k' u,
+
+    u' (x_KF - x_coast) = b_k' (E_k - E_j),        u' (P_coast - P_KF) u = b_k' (M_j - M_k) b_k,
+
+and no second solution is ever carried forward. The fifteen inertial states suffice: no other state acts on them between
+epochs. The separation and its variance are of Kujur 2024, eqs 49 and 50; the common origin is ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.navigation.tight_model import TightModel
+from spoofgym.navigation.tight_states import INERTIAL, POSITION
+
+PACKED = NUM_STATES * (NUM_STATES + 1) // 2
+"""Entries of the lower triangle of a covariance of the inertial states."""
+
+
+@dataclass(frozen=True)
+class CoastingTables:
+    """What all windows of all runs share, by epoch; rows are the epochs 1 - n..K, those before epoch 0 as epoch 0.
+
+    Attributes:
+        num_windows: n, open at once.
+        directions: places of the A directions u among east, north and up, (A,).
+        inverse: C⁻¹, (R, 15, 15).
+        projected: b = C' u, (R, A, 15).
+        noise: Γ, (R, 15, 15).
+        response: C⁻¹ U, (R, 15, m): what a whitened innovation does to E, less the sign; every range used.
+        variance: u' (P_coast - P_KF) u by the epochs since the window was opened, from 1 on, (R, A, n), m²; the same.
+        filtered: u' P_KF u after the ranges, (R, A), m²; the same.
+        early: M of the windows opened before epoch 0 less that of epoch -1, by the epochs since then at epoch 0, from 1
+            on, packed, (120, n).
+    """
+
+    num_windows: int
+    directions: Runs
+    inverse: Floats
+    projected: Floats
+    noise: Floats
+    response: Floats
+    variance: Floats
+    filtered: Floats
+    early: Floats
+
+
+def coasting_tables(model: TightModel, directions: tuple[int, ...], num_windows: int) -> CoastingTables:
+    """The tables of a bank.
+
+    Args:
+        model: of epochs 0..K.
+        directions: places of the directions among east, north and up.
+        num_windows: n.
+    """
+    places = np.array(directions, dtype=np.int64)
+    rows = np.maximum(np.arange(1 - num_windows, model.num_epochs + 1), 0)
+    transition, process_noise = model.separation_transition, model.separation_noise
+    backward = np.linalg.inv(transition)
+    inverse, noise = np.empty((len(rows), NUM_STATES, NUM_STATES)), np.empty((len(rows), NUM_STATES, NUM_STATES))
+    projected = np.empty((len(rows), len(places), NUM_STATES))
+    carried, undone, spread = np.eye(NUM_STATES), np.eye(NUM_STATES), np.zeros((NUM_STATES, NUM_STATES))
+    for r, k in enumerate(rows):
+        carried, undone = transition[k] @ carried, undone @ backward[k]
+        spread = transition[k] @ spread @ transition[k].T + process_noise[k]
+        inverse[r], projected[r], noise[r] = undone, carried[POSITION][places], spread
+    gain = model.whitened_gain[:, :, INERTIAL]
+    response = inverse @ gain[rows].transpose(0, 2, 1)
+    variance = np.zeros((len(rows), len(places), num_windows))
+    _separation_variance(response, projected, variance)
+    position_gain = gain[:, :, POSITION][:, :, places]
+    prior = model.covariance[:, POSITION, POSITION][:, places, places]
+    filtered = prior - np.add.reduce(position_gain**2, axis=1)
+    return CoastingTables(
+        num_windows, places, inverse, projected, noise, response, variance, filtered[rows], _early(response, num_windows)
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _separation_variance(response: Floats, projected: Floats, variance: Floats) -> None:
+    """Σ |U_i' C_i⁻ᵀ b_k|² over the epochs i since a window was opened; variance (R, A, n), overwritten."""
+    rows, axes, windows = variance.shape
+    for k in range(rows):
+        for a in range(axes):
+            total = 0.0
+            for age in range(min(windows, k + 1)):
+                for c in range(response.shape[2]):
+                    part = 0.0
+                    for i in range(NUM_STATES):
+                        part += response[k - age, i, c] * projected[k, a, i]
+                    total += part * part
+                variance[k, a, age] = total
+
+
+def _early(response: Floats, num_windows: int) -> Floats:
+    early = np.zeros((PACKED, num_windows))
+    lower = np.tril_indices(NUM_STATES)
+    for age in range(1, num_windows):
+        gain = response[num_windows - 1 - age]
+        early[:, age] = early[:, age - 1] + (gain @ gain.T)[lower]
+    return early

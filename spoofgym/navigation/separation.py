@@ -1,0 +1,374 @@
+"""Windows of solution separation, all of them at once: N runs of a filter and of the coastings that depart from it.
+
+The equations are those of `coasting`: a window is the E and, where every run has a covariance of its own, the M of the
+epoch after which it was opened.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.navigation.coasting import PACKED, CoastingTables
+from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.navigation.tight_filter import POSITION
+
+
+class CoastingWindows:
+    """The n windows of N runs, one opened after every epoch, closed n epochs later.
+
+    Attributes:
+        age: epochs since the newest window was opened that has closed without an alarm; since the reset where none has,
+            (N,). As of the epoch before, the present one counted.
+    """
+
+    def __init__(self, num_runs: int, num_windows: int) -> None:
+        """Allocate ``num_runs`` runs without a window."""
+        self._num_windows = num_windows
+        self.age = np.zeros(num_runs, dtype=np.int64)
+        self._clean_age = np.zeros(num_runs, dtype=np.int64)
+        self._total = np.zeros((num_runs, NUM_STATES))
+        self._departure = np.zeros((num_runs, NUM_STATES, num_windows))
+        self._excess: Floats | None = None
+        self._alarmed = np.zeros((num_runs, num_windows), dtype=bool)
+        self._place = np.zeros(num_runs, dtype=np.int64)
+        self._count = np.zeros(num_runs, dtype=np.int64)
+
+    def reset(self, runs: Runs) -> None:
+        """Close all windows of these runs."""
+        for part in (self.age, self._clean_age, self._total, self._place, self._count):
+            part[runs] = 0
+
+    def take(self, runs: Runs, other: CoastingWindows) -> None:
+        """Copy the windows of fewer runs; run j becomes ``runs[j]`` here."""
+        for name in ("age", "_clean_age", "_total", "_departure", "_alarmed", "_place", "_count"):
+            getattr(self, name)[runs] = getattr(other, name)
+        # None: no run is at epoch 0 yet, where they are made
+        if other._excess is not None:
+            self._covariances()[runs] = other._excess
+
+    def _covariances(self) -> Floats:
+        """M of the windows, packed, (N, 120, n); allocated where covariances are each run's own."""
+        if self._excess is None:
+            self._excess = np.zeros((len(self.age), PACKED, self._num_windows))
+        return self._excess
+
+    def separate(self, tables: CoastingTables, row: Runs, whitened: Floats, limit: float) -> tuple[Floats, Floats, Floats]:
+        """See an epoch of filters that use every range.
+
+        Args:
+            tables: of the filter.
+            row: of each run in them, (N,); negative where a run has nothing to see yet.
+            whitened: w, (N, m).
+            limit: of |d| / σ_ss, above which a window alarms.
+
+        Returns:
+            The largest |d| / σ_ss of all windows, (N,); σ_ss and σ_coast of the most uncertain one, (N, A), m.
+        """
+        ratio, separation, coasting = self._results(tables)
+        _separate(
+            row,
+            whitened,
+            tables.response,
+            tables.projected,
+            tables.variance,
+            tables.filtered,
+            limit,
+            self._total,
+            self._departure,
+            self._alarmed,
+            self._place,
+            self._count,
+            self.age,
+            self._clean_age,
+            ratio,
+            separation,
+            coasting,
+        )
+        return ratio, separation, coasting
+
+    def separate_own(
+        self,
+        tables: CoastingTables,
+        row: Runs,
+        whitened: Floats,
+        limit: float,
+        auxiliary: Floats,
+        covariance: Floats,
+        gain: Floats,
+        given: Flags,
+        backtracked: Runs,
+    ) -> tuple[Floats, Floats, Floats]:
+        """See an epoch of filters that each have a covariance of their own, from epoch 0 on.
+
+        Args:
+            tables: of the filter.
+            row: of each run in them, (N,).
+            whitened: w, (N, m).
+            limit: of |d| / σ_ss, above which a window alarms.
+            auxiliary: the unaided solution minus the filter's, (N, 15), before the ranges.
+            covariance: P of the inertial states before the ranges, (N, 15, 15).
+            gain: U' of the position, (N, m, 3), m.
+            given: whether there are ranges, (N,).
+            backtracked: epochs whose ranges were taken back at the epoch before, (N,).
+
+        Returns:
+            As `separate`.
+        """
+        ratio, separation, coasting = self._results(tables)
+        _separate_own(
+            row,
+            whitened,
+            auxiliary,
+            covariance,
+            gain,
+            given,
+            backtracked,
+            tables.directions,
+            tables.inverse,
+            tables.projected,
+            tables.noise,
+            tables.early,
+            limit,
+            self._total,
+            self._departure,
+            self._covariances(),
+            self._alarmed,
+            self._place,
+            self._count,
+            self.age,
+            self._clean_age,
+            ratio,
+            separation,
+            coasting,
+        )
+        return ratio, separation, coasting
+
+    def _results(self, tables: CoastingTables) -> tuple[Floats, Floats, Floats]:
+        runs, axes = len(self.age), len(tables.directions)
+        return np.zeros(runs), np.zeros((runs, axes)), np.zeros((runs, axes))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _open(
+    run: int, origin: Floats, departure: Floats, alarmed: Flags, place: Runs, count: Runs, age: Runs, clean_age: Runs
+) -> int:
+    """Open the window of the epoch before, at E = ``origin``, in place of the oldest; its slot."""
+    slot, n = place[run], departure.shape[2]
+    for i in range(NUM_STATES):
+        departure[run, i, slot] = origin[i]
+    alarmed[run, slot] = False
+    place[run] = (slot + 1) % n
+    count[run] = min(count[run] + 1, n)
+    clean_age[run] += 1
+    age[run] = clean_age[run]
+    return int(slot)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _close(run: int, alarmed: Flags, place: Runs, count: Runs, clean_age: Runs) -> None:
+    """The oldest window has seen its last epoch."""
+    n = alarmed.shape[1]
+    if count[run] == n and not alarmed[run, place[run]]:
+        clean_age[run] = n
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _separations(present: Floats, direction: Floats, departure: Floats, separation: Floats) -> None:
+    """b' (E_k - E_j) of all slots, (n,); present E_k (15,), direction b (15,), departure (15, n)."""
+    base = 0.0
+    for i in range(NUM_STATES):
+        base += direction[i] * present[i]
+    for s in range(separation.shape[0]):
+        separation[s] = base
+    for i in range(NUM_STATES):
+        factor = direction[i]
+        for s in range(separation.shape[0]):
+            separation[s] -= factor * departure[i, s]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _separate(
+    row: Runs,
+    whitened: Floats,
+    response: Floats,
+    projected: Floats,
+    variance: Floats,
+    filtered: Floats,
+    limit: float,
+    total: Floats,
+    departure: Floats,
+    alarmed: Flags,
+    place: Runs,
+    count: Runs,
+    age: Runs,
+    clean_age: Runs,
+    ratio: Floats,
+    separation_sigma: Floats,
+    coasting_sigma: Floats,
+) -> None:
+    n = departure.shape[2]
+    separation = np.empty(n)
+    for run in range(len(row)):
+        k = row[run]
+        if k < 0:
+            continue
+        _open(run, total[run], departure, alarmed, place, count, age, clean_age)
+        for i in range(NUM_STATES):
+            for c in range(whitened.shape[1]):
+                total[run, i] -= response[k, i, c] * whitened[run, c]
+        largest = 0.0
+        for a in range(projected.shape[1]):
+            _separations(total[run], projected[k, a], departure[run], separation)
+            for j in range(count[run]):
+                slot = place[run] - 1 - j
+                if slot < 0:
+                    slot += n
+                if variance[k, a, j] > 0.0:
+                    square = separation[slot] * separation[slot] / variance[k, a, j]
+                    largest = max(largest, square)
+                    if square > limit * limit:
+                        alarmed[run, slot] = True
+            most = variance[k, a, count[run] - 1]
+            separation_sigma[run, a] = np.sqrt(most)
+            coasting_sigma[run, a] = np.sqrt(filtered[k, a] + most)
+        ratio[run] = np.sqrt(largest)
+        _close(run, alarmed, place, count, clean_age)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _separate_own(
+    row: Runs,
+    whitened: Floats,
+    auxiliary: Floats,
+    covariance: Floats,
+    gain: Floats,
+    given: Flags,
+    backtracked: Runs,
+    directions: Runs,
+    inverse: Floats,
+    projected: Floats,
+    noise: Floats,
+    early: Floats,
+    limit: float,
+    total: Floats,
+    departure: Floats,
+    excess: Floats,
+    alarmed: Flags,
+    place: Runs,
+    count: Runs,
+    age: Runs,
+    clean_age: Runs,
+    ratio: Floats,
+    separation_sigma: Floats,
+    coasting_sigma: Floats,
+) -> None:
+    n = departure.shape[2]
+    separation, variance = np.empty(n), np.empty(n)
+    present, beyond, weight = np.empty(NUM_STATES), np.empty(PACKED), np.empty(PACKED)
+    work = np.empty((NUM_STATES, NUM_STATES))
+    for run in range(len(row)):
+        k = row[run]
+        for i in range(NUM_STATES):
+            present[i] = total[run, i]
+            for j in range(NUM_STATES):
+                present[i] -= inverse[k, i, j] * auxiliary[run, j]
+        slot = _open(run, present, departure, alarmed, place, count, age, clean_age)
+        _bring_back(covariance[run], noise[k], inverse[k], work, beyond)
+        for p in range(PACKED):
+            excess[run, p, slot] = beyond[p]
+        if k == n - 1:
+            _fill_early(slot, count[run], early, excess[run])
+        if backtracked[run] > 0:
+            _take_back(slot, count[run], backtracked[run], departure[run], excess[run], alarmed[run])
+        largest = 0.0
+        for a in range(len(directions)):
+            moved, gained = 0.0, 0.0
+            if given[run]:
+                for c in range(whitened.shape[1]):
+                    part = gain[run, c, directions[a]]
+                    moved += part * whitened[run, c]
+                    gained += part * part
+            _separations(present, projected[k, a], departure[run], separation)
+            _quadratic_forms(projected[k, a], excess[run], slot, weight, variance)
+            most = 0.0
+            for j in range(count[run]):
+                s = slot - j
+                if s < 0:
+                    s += n
+                coasted = max(variance[s], 0.0)
+                most = max(most, coasted)
+                if coasted + gained > 0.0:
+                    square = (separation[s] - moved) ** 2 / (coasted + gained)
+                    largest = max(largest, square)
+                    if square > limit * limit:
+                        alarmed[run, s] = True
+            prior = covariance[run, POSITION + directions[a], POSITION + directions[a]]
+            separation_sigma[run, a] = np.sqrt(most + gained)
+            coasting_sigma[run, a] = np.sqrt(prior + most)
+        ratio[run] = np.sqrt(largest)
+        _close(run, alarmed, place, count, clean_age)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _bring_back(covariance: Floats, noise: Floats, inverse: Floats, work: Floats, packed: Floats) -> None:
+    """C⁻¹ (P - Γ) C⁻ᵀ, its lower triangle by rows, (120,); the others (15, 15)."""
+    for i in range(NUM_STATES):
+        for j in range(NUM_STATES):
+            work[i, j] = 0.0
+        for l in range(NUM_STATES):
+            factor = inverse[i, l]
+            if factor != 0.0:
+                for j in range(NUM_STATES):
+                    work[i, j] += factor * (covariance[l, j] - noise[l, j])
+    place = 0
+    for i in range(NUM_STATES):
+        for j in range(i + 1):
+            total = 0.0
+            for l in range(NUM_STATES):
+                total += work[i, l] * inverse[j, l]
+            packed[place] = total
+            place += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill_early(slot: int, count: int, early: Floats, excess: Floats) -> None:
+    """M of the windows opened before epoch 0, at which the newest stands in ``slot``; excess (120, n)."""
+    for p in range(PACKED):
+        for age in range(1, count):
+            excess[p, slot - age] = excess[p, slot] + early[p, age]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take_back(slot: int, count: int, depth: int, departure: Floats, excess: Floats, alarmed: Flags) -> None:
+    """The filter has coasted in the epochs taken back: their windows are as the one opened before them.
+
+    Where that one has closed they are as the newest, in ``slot``.
+    """
+    source = slot - depth - 1 if depth + 1 < count else slot
+    for age in range(1, min(depth, count - 1) + 1):
+        for i in range(NUM_STATES):
+            departure[i, slot - age] = departure[i, source]
+        for p in range(PACKED):
+            excess[p, slot - age] = excess[p, source]
+        alarmed[slot - age] = alarmed[source]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _quadratic_forms(direction: Floats, excess: Floats, slot: int, weight: Floats, variance: Floats) -> None:
+    """b' (M_j - M_k) b of all slots j, (n,), of which k is one; direction b (15,), excess (120, n), weight (120,)."""
+    place = 0
+    for i in range(NUM_STATES):
+        for j in range(i + 1):
+            weight[place] = direction[i] * direction[j] * (1.0 if i == j else 2.0)
+            place += 1
+    base = 0.0
+    for p in range(PACKED):
+        base += weight[p] * excess[p, slot]
+    for s in range(variance.shape[0]):
+        variance[s] = -base
+    for p in range(PACKED):
+        factor = weight[p]
+        for s in range(variance.shape[0]):
+            variance[s] += factor * excess[p, s]

@@ -1,0 +1,293 @@
+"""The equations of the tightly coupled filter, one run at a time, in the whitened form of `kalman`.
+
+What makes them fast is the structure of the model: only nine states have a dense row in Φ, the clock has one entry off
+the diagonal, every other state has its decay alone; a row of H has nine entries. All loops run along rows of P.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.navigation import kalman
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.tight_states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE
+
+POSITION = 6
+"""Place of the position's first state."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def predict_error(
+    columns: Floats, decay: Floats, interval: float, noise: Floats, error: Floats, work: Floats
+) -> None:
+    """x <- Φ x + w.
+
+    Args:
+        columns: the first nine rows of Φ, stored by columns, (15, 9).
+        decay: the diagonal of Φ, (n,); its first nine entries are not read.
+        interval: between epochs, s: what the clock's rate adds to its offset.
+        noise: w, (n,).
+        error: x, (n,), in place.
+        work: (9,).
+    """
+    for i in range(NUM_NAVIGATION):
+        work[i] = noise[i]
+    for j in range(NUM_STATES):
+        factor = error[j]
+        for i in range(NUM_NAVIGATION):
+            work[i] += columns[j, i] * factor
+    error[CLOCK] += interval * error[DRIFT]
+    for i in range(NUM_NAVIGATION):
+        error[i] = work[i]
+    for i in range(NUM_NAVIGATION, error.shape[0]):
+        error[i] = decay[i] * error[i] + noise[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def predict_covariance(
+    transition: Floats,
+    process_noise: Floats,
+    decay: Floats,
+    variance: Floats,
+    clock_noise: Floats,
+    interval: float,
+    covariance: Floats,
+    work: Floats,
+) -> None:
+    """P <- Φ P Φ' + Q.
+
+    Args:
+        transition: the first nine rows of Φ, (9, 15).
+        process_noise: Q of the nine navigation states, (9, 9).
+        decay: the diagonal of Φ, (n,).
+        variance: the diagonal of Q from the tenth state on, (n,), without the clock's.
+        clock_noise: Q of the clock, (2, 2).
+        interval: between epochs, s.
+        covariance: P, (n, n), in place.
+        work: (9, n).
+    """
+    n = covariance.shape[0]
+    for j in range(n):
+        covariance[CLOCK, j] += interval * covariance[DRIFT, j]
+    for i in range(n):
+        covariance[i, CLOCK] += interval * covariance[i, DRIFT]
+    for i in range(NUM_NAVIGATION):
+        for j in range(n):
+            work[i, j] = 0.0
+        for k in range(NUM_STATES):
+            factor = transition[i, k]
+            if factor != 0.0:
+                for j in range(n):
+                    work[i, j] += factor * covariance[k, j]
+    for i in range(NUM_NAVIGATION):
+        for j in range(i + 1):
+            total = process_noise[i, j]
+            for k in range(NUM_STATES):
+                total += work[i, k] * transition[j, k]
+            covariance[i, j] = total
+            covariance[j, i] = total
+    for j in range(NUM_NAVIGATION, n):
+        for i in range(NUM_NAVIGATION):
+            covariance[i, j] = work[i, j] * decay[j]
+            covariance[j, i] = covariance[i, j]
+    for i in range(NUM_NAVIGATION, n):
+        factor = decay[i]
+        for j in range(NUM_NAVIGATION, n):
+            covariance[i, j] *= factor * decay[j]
+        covariance[i, i] += variance[i]
+    for i in range(2):
+        for j in range(2):
+            covariance[CLOCK + i, CLOCK + j] += clock_noise[i, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def start_satellites(started: Flags, sigma: Floats, covariance: Floats) -> None:
+    """A slot that holds a new satellite forgets the old one.
+
+    Args:
+        started: whether each slot does, (S,) bool.
+        sigma: prior of the five states of a satellite, (5,).
+        covariance: P, (n, n), in place.
+    """
+    for s in range(started.shape[0]):
+        if started[s]:
+            for a in range(PER_SATELLITE):
+                place = NUM_COMMON + PER_SATELLITE * s + a
+                for j in range(covariance.shape[0]):
+                    covariance[place, j] = 0.0
+                    covariance[j, place] = 0.0
+                covariance[place, place] = sigma[a] * sigma[a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def innovation_covariance(
+    covariance: Floats, columns: Runs, values: Floats, variance: Floats, cross: Floats, innovation: Floats
+) -> None:
+    """HP and S = H P H' + R.
+
+    Args:
+        covariance: P, (n, n).
+        columns: places of the entries of H, (m, 9).
+        values: the entries, (m, 9); zeros cost nothing.
+        variance: the diagonal of R, (m,).
+        cross: HP, (m, n), overwritten.
+        innovation: S, (m, m), overwritten.
+    """
+    m, n = cross.shape
+    for a in range(m):
+        for j in range(n):
+            cross[a, j] = 0.0
+        for k in range(columns.shape[1]):
+            factor = values[a, k]
+            if factor != 0.0:
+                row = columns[a, k]
+                for j in range(n):
+                    cross[a, j] += factor * covariance[row, j]
+    for a in range(m):
+        for b in range(a + 1):
+            total = variance[a] if a == b else 0.0
+            for k in range(columns.shape[1]):
+                total += values[b, k] * cross[a, columns[b, k]]
+            innovation[a, b] = total
+            innovation[b, a] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
+    """U' = L⁻¹ H P; cross HP (m, n), factor L (m, m), gain U' (m, n), overwritten."""
+    m, n = cross.shape
+    for a in range(m):
+        for i in range(n):
+            gain[a, i] = cross[a, i]
+        for b in range(a):
+            share = factor[a, b]
+            if share != 0.0:
+                for i in range(n):
+                    gain[a, i] -= share * gain[b, i]
+        scale = 1.0 / factor[a, a]
+        for i in range(n):
+            gain[a, i] *= scale
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def position_response(columns: Runs, values: Floats, factor: Floats, response: Floats) -> None:
+    """L⁻¹ H on the three states of the position, (m, 3), overwritten."""
+    m = factor.shape[0]
+    for a in range(m):
+        for c in range(3):
+            response[a, c] = 0.0
+        for k in range(3):
+            if columns[a, k] >= POSITION:
+                response[a, columns[a, k] - POSITION] = values[a, k]
+        for c in range(3):
+            total = response[a, c]
+            for b in range(a):
+                total -= factor[a, b] * response[b, c]
+            response[a, c] = total / factor[a, a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def update_covariance(gain: Floats, covariance: Floats) -> None:
+    """P <- P - U U'; gain U' (m, n), covariance (n, n) in place.
+
+    Four measurements at a time, so that a row of P is loaded a quarter as often.
+    """
+    m, n = gain.shape
+    for i in range(n):
+        a = 0
+        while a + 4 <= m:
+            f0, f1, f2, f3 = gain[a, i], gain[a + 1, i], gain[a + 2, i], gain[a + 3, i]
+            for j in range(n):
+                covariance[i, j] -= (
+                    f0 * gain[a, j] + f1 * gain[a + 1, j] + f2 * gain[a + 2, j] + f3 * gain[a + 3, j]
+                )
+            a += 4
+        while a < m:
+            f0 = gain[a, i]
+            for j in range(n):
+                covariance[i, j] -= f0 * gain[a, j]
+            a += 1
+    for i in range(n):
+        for j in range(i):
+            covariance[j, i] = covariance[i, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def correct_error(gain: Floats, whitened: Floats, error: Floats) -> None:
+    """x <- x - K z = x - U w; gain U' (m, n), whitened w (m,), error x (n,) in place."""
+    for a in range(gain.shape[0]):
+        factor = whitened[a]
+        for i in range(gain.shape[1]):
+            error[i] -= gain[a, i] * factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def observe(columns: Runs, values: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
+    """z = H x - deviation; columns and values of H (m, 9), state x (n,), the others (m,)."""
+    for a in range(residual.shape[0]):
+        total = -deviation[a]
+        for k in range(columns.shape[1]):
+            total += values[a, k] * state[columns[a, k]]
+        residual[a] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def leave_out(
+    satellites: Flags, values: Floats, variance: Floats, scale: float, residual: Floats, taken: Floats, used: Floats
+) -> None:
+    """H and R of the satellites that are used; the others become like empty slots.
+
+    Args:
+        satellites: which are used, (S,).
+        values: entries of H, (m, 9).
+        variance: diagonal of R, (m,).
+        scale: factor on it.
+        residual: z, (m,), in place.
+        taken: entries of H that are left, (m, 9), overwritten.
+        used: diagonal of R, (m,), overwritten.
+    """
+    slots = satellites.shape[0]
+    for a in range(residual.shape[0]):
+        use = satellites[a % slots]
+        used[a] = scale * variance[a] if use else 1.0
+        for k in range(values.shape[1]):
+            taken[a, k] = values[a, k] if use else 0.0
+        if not use:
+            residual[a] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def form_innovation(
+    residual: Floats,
+    covariance: Floats,
+    columns: Runs,
+    values: Floats,
+    variance: Floats,
+    innovation: Floats,
+    gain: Floats,
+    response: Floats,
+    whitened: Floats,
+    cross: Floats,
+    factor: Floats,
+) -> float:
+    """All that a residual leads to: S, U', L⁻¹ H on the position, w, and the NIS, which it returns.
+
+    Args:
+        residual: z, (m,).
+        covariance: P, (n, n).
+        columns: places of the entries of H, (m, 9).
+        values: the entries, (m, 9).
+        variance: diagonal of R, (m,).
+        innovation: S, (m, m), overwritten.
+        gain: U', (m, n), overwritten.
+        response: (m, 3), overwritten.
+        whitened: w, (m,), overwritten.
+        cross: (m, n), work.
+        factor: (m, m), work.
+    """
+    innovation_covariance(covariance, columns, values, variance, cross, innovation)
+    kalman.cholesky(innovation, factor)
+    whitened_gain(cross, factor, gain)
+    position_response(columns, values, factor, response)
+    return kalman.whiten(factor, residual, whitened)

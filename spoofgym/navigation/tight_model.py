@@ -1,0 +1,365 @@
+"""The tightly coupled filter along a true trajectory, one step per epoch: Φ, Q, H, R, and its gains.
+
+As for the loosely coupled filter (`linear_model`), neither Φ nor the gains depend on what a spoofer does, so they are
+computed once along the truth. Satellites set and rise on the way: their slots forget.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.navigation import kalman, tight_filter
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.linear_model import ErrorDynamics, semidefinite_factor
+from spoofgym.navigation.tight_states import (
+    BIAS,
+    CLOCK,
+    DRIFT,
+    PER_SATELLITE,
+    TROPOSPHERE,
+    num_states,
+    observation_columns,
+    observation_values,
+    slot_states,
+)
+from spoofgym.sensors.geometry import SatelliteGeometry
+from spoofgym.sensors.imu import ImuGrade
+from spoofgym.sensors.ranging import RangeErrors, clock_noise
+
+
+@dataclass(frozen=True)
+class TightDynamics:
+    """What acts on the error state, epoch by epoch, and what observes it; leading axis: epochs.
+
+    Attributes:
+        time: of the epochs, (E,), s.
+        interval: between them, s.
+        satellite: number of the satellite in each slot, -1 = empty, (E, S).
+        line_of_sight: unit vectors to the satellites, (E, S, 3), ENU.
+        transition: first nine rows of Φ from the epoch before, (E, 9, 15).
+        process_noise: Q of the nine navigation states, (E, 9, 9).
+        decay: diagonal of Φ, (n,); the first nine are not read.
+        variance: diagonal of Q from the tenth state on, (n,), without the clock's.
+        clock_noise: Q of the clock, (2, 2), m and m/s.
+        started: whether a slot holds another satellite than at the epoch before, (E, S).
+        satellite_sigma: prior of the states of a new satellite, (5,), m.
+        columns: places of the entries of H, (m, 9).
+        values: the entries, (E, m, 9).
+        noise_variance: diagonal of R, (E, m).
+    """
+
+    time: Floats
+    interval: float
+    satellite: NDArray[np.int64]
+    line_of_sight: Floats
+    transition: Floats
+    process_noise: Floats
+    decay: Floats
+    variance: Floats
+    clock_noise: Floats
+    started: NDArray[np.bool_]
+    satellite_sigma: Floats
+    columns: NDArray[np.int64]
+    values: Floats
+    noise_variance: Floats
+
+    @property
+    def num_states(self) -> int:
+        """n, of the error state."""
+        return len(self.decay)
+
+    @property
+    def dimension(self) -> int:
+        """m, of the measurements of all slots."""
+        return len(self.columns)
+
+    @property
+    def num_slots(self) -> int:
+        """S."""
+        return self.satellite.shape[1]
+
+    @property
+    def num_epochs(self) -> int:
+        """Epochs after the first one."""
+        return len(self.time) - 1
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Whether a slot holds a satellite, (E, S)."""
+        return self.satellite >= 0
+
+    @cached_property
+    def transition_columns(self) -> Floats:
+        """The nine rows of each Φ, stored by columns, (E, 15, 9)."""
+        return np.ascontiguousarray(self.transition.transpose(0, 2, 1))
+
+    @cached_property
+    def noise_columns(self) -> Floats:
+        """A square root of each Q of the navigation states, stored by columns, (E, 9, 9)."""
+        return np.ascontiguousarray([semidefinite_factor(q).T for q in self.process_noise])
+
+    @cached_property
+    def clock_factor(self) -> Floats:
+        """A square root of the clock's Q, (2, 2)."""
+        return semidefinite_factor(self.clock_noise)
+
+    @cached_property
+    def noise_sigma(self) -> Floats:
+        """Square root of `variance`, (n,)."""
+        return np.sqrt(self.variance)
+
+    def part(self, first: int, last: int) -> TightDynamics:
+        """Epochs first..last-1 of these."""
+        whole = {"interval", "decay", "variance", "clock_noise", "satellite_sigma", "columns"}
+        cut = {item.name: getattr(self, item.name)[first:last] for item in fields(TightDynamics)
+               if item.name not in whole}
+        return replace(self, **cut)
+
+
+@dataclass(frozen=True)
+class TightModel:
+    """A game of the tightly coupled filter: epochs k = 0..K, of which 0 is the last clean one; every range used.
+
+    Attributes:
+        dynamics: of these epochs.
+        prior_covariance: the filter's P after epoch -1, (n, n).
+        covariance: the filter's P at epoch k before the ranges, (K+1, n, n).
+        innovation_covariance: S, (K+1, m, m).
+        innovation_factor: lower L with S = L L', (K+1, m, m).
+        whitened_gain: U' = L⁻¹ H P, (K+1, m, n).
+        position_response: L⁻¹ H on the states of the position, (K+1, m, 3), 1/m.
+    """
+
+    dynamics: TightDynamics
+    prior_covariance: Floats
+    covariance: Floats
+    innovation_covariance: Floats
+    innovation_factor: Floats
+    whitened_gain: Floats
+    position_response: Floats
+
+    @property
+    def time(self) -> Floats:
+        """Of the epochs, (K+1,), s."""
+        return self.dynamics.time
+
+    @property
+    def dimension(self) -> int:
+        """m."""
+        return self.dynamics.dimension
+
+    @property
+    def num_epochs(self) -> int:
+        """K."""
+        return self.dynamics.num_epochs
+
+    @cached_property
+    def separation_transition(self) -> Floats:
+        """Φ of the fifteen states that inertial coasting needs, (K+1, 15, 15)."""
+        dynamics = self.dynamics
+        whole = np.zeros((len(self.time), NUM_STATES, NUM_STATES))
+        whole[:, :NUM_NAVIGATION] = dynamics.transition
+        whole[:, range(9, 15), range(9, 15)] = dynamics.decay[BIAS]
+        return whole
+
+    @cached_property
+    def separation_noise(self) -> Floats:
+        """Q of the fifteen states that inertial coasting needs, (K+1, 15, 15)."""
+        dynamics = self.dynamics
+        whole = np.zeros((len(self.time), NUM_STATES, NUM_STATES))
+        whole[:, :NUM_NAVIGATION, :NUM_NAVIGATION] = dynamics.process_noise
+        whole[:, range(9, 15), range(9, 15)] = dynamics.variance[BIAS]
+        return whole
+
+
+def tight_dynamics(
+    inertial: ErrorDynamics,
+    grade: ImuGrade,
+    errors: RangeErrors,
+    geometry: SatelliteGeometry,
+    interval: float,
+    observable: str,
+) -> TightDynamics:
+    """The model of truth and filter alike on consecutive epochs.
+
+    A bias whose data sheet gives an instability alone is first-order Gauss-Markov; one with a constant part, too, is a
+    random walk of the instability's driving noise, as in the loosely coupled filter.
+
+    Args:
+        inertial: Φ and Q of the navigation states, without the instability of the biases, over the epochs.
+        grade: of the IMU.
+        errors: of the ranges.
+        geometry: of the epochs.
+        interval: between them, s.
+        observable: ``carrier`` or ``rate``, beside the code.
+    """
+    slots = geometry.num_slots
+    states = slot_states(slots)
+    decay, variance = np.ones(num_states(slots)), np.zeros(num_states(slots))
+    decay[BIAS], variance[BIAS] = _bias_process(grade, interval)
+    sigma, time = _satellite_processes(errors, observable)
+    for a in range(PER_SATELLITE):
+        decay[states[:, a]] = np.exp(-interval / time[a])
+        variance[states[:, a]] = sigma[a] ** 2 * -np.expm1(-2.0 * interval / time[a])
+    decay[TROPOSPHERE] = np.exp(-interval / errors.troposphere_time)
+    variance[TROPOSPHERE] = errors.troposphere_sigma**2 * -np.expm1(-2.0 * interval / errors.troposphere_time)
+    second = errors.carrier_noise if observable == "carrier" else errors.rate_noise
+    noise = np.repeat([errors.code_noise**2, second**2], slots)
+    return TightDynamics(
+        time=geometry.time,
+        interval=interval,
+        satellite=geometry.satellite,
+        line_of_sight=geometry.line_of_sight,
+        transition=np.ascontiguousarray(inertial.transition[:, :NUM_NAVIGATION]),
+        process_noise=np.ascontiguousarray(inertial.process_noise[:, :NUM_NAVIGATION, :NUM_NAVIGATION]),
+        decay=decay,
+        variance=variance,
+        clock_noise=clock_noise(errors.clock_h0, errors.clock_h2, interval),
+        started=geometry.started,
+        satellite_sigma=sigma,
+        columns=observation_columns(slots, observable),
+        values=observation_values(geometry, observable),
+        noise_variance=np.where(np.tile(geometry.present, 2), noise, 1.0),
+    )
+
+
+def _bias_process(grade: ImuGrade, interval: float) -> tuple[float, Floats]:
+    """Decay and driving variance of the six biases over an epoch."""
+    decay = np.exp(-interval / grade.correlation_time) if not np.any(grade.bias_sigma) else 1.0
+    instability = grade.instability_sigma**2
+    if decay == 1.0:
+        return 1.0, 2.0 * instability * interval / grade.correlation_time
+    return float(decay), instability * (1.0 - decay**2)
+
+
+def bias_variance(grade: ImuGrade, interval: float, epochs: int) -> Floats:
+    """Variance of the true biases so many epochs after power-on, (6,), (rad/s)² and (m/s²)²."""
+    decay, variance = _bias_process(grade, interval)
+    beginning = grade.bias_sigma**2 + grade.instability_sigma**2
+    return beginning if decay < 1.0 else beginning + epochs * variance
+
+
+def _satellite_processes(errors: RangeErrors, observable: str) -> tuple[Floats, Floats]:
+    """Stationary sigma, m, and correlation time, s, of the five states of a satellite; the ambiguity is constant."""
+    carrier = 1.0 if observable == "carrier" else 0.0
+    sigma = [
+        carrier * errors.ambiguity_sigma,
+        errors.code_multipath_sigma,
+        carrier * errors.carrier_multipath_sigma,
+        errors.ionosphere_sigma,
+        errors.ephemeris_sigma,
+    ]
+    time = [
+        np.inf,
+        errors.code_multipath_time,
+        errors.carrier_multipath_time,
+        errors.ionosphere_time,
+        errors.ephemeris_time,
+    ]
+    return np.array(sigma), np.array(time)
+
+
+def cold_covariance(
+    inertial_sigma: Floats, clock_sigma: tuple[float, float], errors: RangeErrors, slots: int
+) -> Floats:
+    """The filter's P at power-on, (n, n); a slot gets its prior from the satellite that starts there.
+
+    Args:
+        inertial_sigma: of the fifteen states, (15,).
+        clock_sigma: of offset and rate, m and m/s.
+        errors: of the ranges.
+        slots: S.
+    """
+    sigma = np.zeros(num_states(slots))
+    sigma[:NUM_STATES] = inertial_sigma
+    sigma[CLOCK], sigma[DRIFT] = clock_sigma
+    sigma[TROPOSPHERE] = errors.troposphere_sigma
+    return np.diag(sigma**2)
+
+
+def settle(dynamics: TightDynamics, covariance: Floats) -> Floats:
+    """The filter's P after all epochs of ``dynamics``, every range used, (n, n)."""
+    settled, nothing = covariance.copy(), np.empty((0, 0, 0))
+    _run(dynamics, settled, (nothing,) * 5)
+    return settled
+
+
+def tight_model(dynamics: TightDynamics, prior_covariance: Floats) -> TightModel:
+    """The game on the epochs of ``dynamics``, every range used.
+
+    Args:
+        dynamics: of the K+1 epochs.
+        prior_covariance: the filter's P after epoch -1, (n, n).
+    """
+    epochs, m, n = len(dynamics.time), dynamics.dimension, dynamics.num_states
+    kept = tuple(np.empty((epochs, *shape)) for shape in ((n, n), (m, m), (m, m), (m, n), (m, 3)))
+    _run(dynamics, prior_covariance.copy(), kept)
+    return TightModel(dynamics, prior_covariance, *kept)
+
+
+def _run(dynamics: TightDynamics, covariance: Floats, kept: tuple[Floats, ...]) -> None:
+    prior, innovations, factors, gains, responses = kept
+    _recursion(
+        dynamics.transition,
+        dynamics.process_noise,
+        dynamics.decay,
+        dynamics.variance,
+        dynamics.clock_noise,
+        dynamics.interval,
+        dynamics.started,
+        dynamics.satellite_sigma,
+        dynamics.columns,
+        dynamics.values,
+        dynamics.noise_variance,
+        covariance,
+        prior,
+        innovations,
+        factors,
+        gains,
+        responses,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _recursion(
+    transition: Floats,
+    process_noise: Floats,
+    decay: Floats,
+    variance: Floats,
+    clock_noise: Floats,
+    interval: float,
+    started: Flags,
+    satellite_sigma: Floats,
+    columns: Runs,
+    values: Floats,
+    noise_variance: Floats,
+    covariance: Floats,
+    prior: Floats,
+    innovations: Floats,
+    factors: Floats,
+    gains: Floats,
+    responses: Floats,
+) -> None:
+    """The filter's covariance with every range used; keeps what the arrays of epochs have room for."""
+    m, n = columns.shape[0], covariance.shape[0]
+    work, cross, innovation = np.empty((NUM_NAVIGATION, n)), np.empty((m, n)), np.empty((m, m))
+    factor, gain = np.empty((m, m)), np.empty((m, n))
+    keep = len(prior) > 0
+    for k in range(len(transition)):
+        tight_filter.predict_covariance(
+            transition[k], process_noise[k], decay, variance, clock_noise, interval, covariance, work
+        )
+        tight_filter.start_satellites(started[k], satellite_sigma, covariance)
+        tight_filter.innovation_covariance(covariance, columns, values[k], noise_variance[k], cross, innovation)
+        kalman.cholesky(innovation, factor)
+        tight_filter.whitened_gain(cross, factor, gain)
+        if keep:
+            prior[k], innovations[k], factors[k], gains[k] = covariance, innovation, factor, gain
+            tight_filter.position_response(columns, values[k], factor, responses[k])
+        tight_filter.update_covariance(gain, covariance)

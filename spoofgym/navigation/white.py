@@ -1,0 +1,50 @@
+"""Clean innovations of a matched filter: white, and independent of its state, so that they can be drawn directly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from spoofgym.arrays import Flags, Floats
+from spoofgym.navigation.interface import Innovation
+
+
+@dataclass(frozen=True)
+class WhiteInnovations:
+    """What clean innovations are made of, by epoch.
+
+    Attributes:
+        factor: L, lower, of epochs 0..K, (K+1, m, m), or one for all, (1, m, m).
+        range_response: L⁻¹ H on the position, (K+1, m, 3), where ranges are measured.
+        present: whether each measurement is there, (K+1, m), where ranges are measured.
+    """
+
+    factor: Floats
+    range_response: Floats | None = None
+    present: Flags | None = None
+
+    @property
+    def dimension(self) -> int:
+        """m."""
+        return self.factor.shape[1]
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """S = L L', like `factor`."""
+        return np.einsum("kij,klj->kil", self.factor, self.factor)
+
+    def innovation(self, epoch: int, normals: Floats) -> Innovation:
+        """The innovation made of standard normals (N, m); epochs outside 0..K are as the nearest one."""
+        n, m = normals.shape
+        k = min(max(epoch, 0), len(self.factor) - 1)
+        present = None if self.present is None else np.broadcast_to(self.present[k], (n, m))
+        response = None if self.range_response is None else np.broadcast_to(self.range_response[k], (n, m, 3))
+        whitened = normals if present is None else np.where(present, normals, 0.0)
+        residual, nis = np.zeros((n, m)), np.zeros(n)
+        for j in range(m):
+            residual += whitened[:, j, None] * self.factor[k, :, j]
+            nis += whitened[:, j] ** 2
+        covariance = np.broadcast_to(self.covariance[k], (n, m, m))
+        return Innovation(residual, covariance, whitened, nis, response, present)

@@ -1,0 +1,128 @@
+"""The flight of Kujur, Khanafseh and Pervan (2024): straight and level, en route, over Chicago.
+
+Place, speed, height, the rate of 2 Hz, the constellation, the errors of the ranges and the longest window of 180 s
+follow the paper. Ours are the heading, the settling time, the elevation mask, the initial uncertainties, and the grades
+of the IMU, whose table is missing in the text that we have.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from spoofgym import validation
+from spoofgym.navigation.tuning import FilterTuning
+from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.sensors.constellation import gps_24
+from spoofgym.sensors.imu import grade
+from spoofgym.sensors.range_fix import range_fix_along
+from spoofgym.sensors.ranging import KUJUR
+from spoofgym.sensors.receiver import ZERO, Receiver
+from spoofgym.specification import spell
+from spoofgym.tight_scenario import TightScenario
+from spoofgym.trajectory import Straight, Trajectory, fly
+
+START = (math.radians(41.0 + 50.0 / 60.0 + 10.0 / 3600.0), -math.radians(87.0 + 37.0 / 60.0 + 30.0 / 3600.0), 12192.0)
+"""Latitude rad, longitude rad, height m (40,000 ft)."""
+SPEED = 454.0 * 1852.0 / 3600.0
+"""454 knots, m/s."""
+RATE = 2.0
+MASK = math.radians(5.0)
+TUNING = FilterTuning(position_random_walk=0.0, initial_scale=1.0, position_sigma=(10.0, 10.0, 10.0))
+ALERT_LIMITS = (556.0, 50.0)
+"""Horizontal and vertical, m: RNP 0.3, and the limit of an approach with vertical guidance (DO-229, LNAV/VNAV)."""
+HOUR = 4.0
+"""Of the constellation's day: eight satellites are then in view all along the flight."""
+COUPLINGS = ("loose", "tight")
+DRAG_OFF_RATE = (4.0, 4.0, 4.0)
+
+
+@lru_cache(maxsize=4)
+def kujur_trajectory(duration: float) -> Trajectory:
+    """True motion: north at 454 knots and 40,000 ft, sampled at 100 Hz.
+
+    Args:
+        duration: s.
+    """
+    return fly([Straight(duration)], position=START, speed=SPEED, heading=0.0)
+
+
+def kujur_flight(
+    coupling: str = "tight",
+    horizon: int = 120,
+    onset: float = 900.0,
+    hour: float = HOUR,
+    imu: str = "kujur-navigation",
+) -> Scenario:
+    """The flight as a game on a filter that has settled for 15 minutes.
+
+    Args:
+        coupling: ``tight``: the filter takes code and carrier of every satellite; ``loose``: it takes least-squares
+            fixes from the code alone. Its R is diagonal, with the variances that all errors of the ranges together
+            give a fix of epoch 0, as if they were white (ours, after Liu 2018, whose R is that sum, too).
+        horizon: epochs of the game, half a second each.
+        onset: time of the last clean epoch, s.
+        hour: of the constellation's day at which the flight starts.
+        imu: name of the IMU grade.
+
+    Raises:
+        ValueError: an unknown coupling or IMU, or a number out of range.
+    """
+    owner = "kujur-flight"
+    validation.one_of(owner, "coupling", coupling, COUPLINGS)
+    validation.whole(owner, "horizon", horizon, 1)
+    validation.above(owner, "onset", onset)
+    validation.finite(owner, "hour", hour)
+    name = spell(
+        owner,
+        coupling=None if coupling == "tight" else coupling,
+        horizon=None if horizon == 120 else horizon,
+        onset=None if onset == 900.0 else onset,
+        hour=None if hour == HOUR else hour,
+        imu=None if imu == "kujur-navigation" else imu,
+    )
+    trajectory = kujur_trajectory(onset + horizon / RATE)
+    if coupling == "loose":
+        return _loose(name, trajectory, horizon, onset, hour, imu)
+    return TightScenario(
+        name=name,
+        trajectory=trajectory,
+        grade=grade(imu),
+        errors=KUJUR,
+        constellation=gps_24(),
+        start_time=3600.0 * hour,
+        rate=RATE,
+        mask=MASK,
+        tuning=TUNING,
+        onset=onset,
+        horizon=horizon,
+        drag_off_rate=DRAG_OFF_RATE,
+        clock_rate=DRAG_OFF_RATE[0],
+        error_scale=10.0,
+        alert_limits=ALERT_LIMITS,
+    )
+
+
+def _loose(
+    name: str, trajectory: Trajectory, horizon: int, onset: float, hour: float, imu: str
+) -> SimulatedScenario:
+    ranges = range_fix_along(KUJUR, gps_24(), trajectory, RATE, 3600.0 * hour, MASK)
+    east, north, up = np.sqrt(np.diag(ranges.covariance(round(onset * RATE) - 1))).tolist()
+    return SimulatedScenario(
+        name=name,
+        trajectory=trajectory,
+        grade=grade(imu),
+        receiver=Receiver(rate=RATE, white_sigma=ZERO),
+        tuning=replace(TUNING, measurement_sigma=(east, north, up)),
+        onset=onset,
+        horizon=horizon,
+        drag_off_rate=DRAG_OFF_RATE,
+        error_scale=10.0,
+        true_position_random_walk=TUNING.position_random_walk,
+        defender_scale=50.0,
+        ranges=ranges,
+        alert_limits=ALERT_LIMITS,
+    )

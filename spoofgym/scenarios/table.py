@@ -1,0 +1,119 @@
+"""Reading the tables of a recorded log: columns of CSV files by their names, plain or gzipped, every value checked."""
+
+from __future__ import annotations
+
+import gzip
+import math
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from spoofgym.arrays import Floats
+
+Limits = Mapping[str, tuple[float, float]]
+"""Valid values, inclusive, of columns that have bounds."""
+
+
+def has_table(folder: Path, name: str) -> bool:
+    """Whether the folder holds ``name.csv`` or ``name.csv.gz``."""
+    return (folder / f"{name}.csv").is_file() or (folder / f"{name}.csv.gz").is_file()
+
+
+def table_path(folder: Path, name: str) -> Path:
+    """The one of ``name.csv`` and ``name.csv.gz`` that is there.
+
+    Raises:
+        ValueError: none is, or both are.
+    """
+    present = [path for path in (folder / f"{name}.csv", folder / f"{name}.csv.gz") if path.is_file()]
+    if not present:
+        raise ValueError(f"{folder / name}.csv (or .csv.gz) is missing")
+    if len(present) == 2:
+        raise ValueError(f"{folder}: {present[0].name} and {present[1].name} are both there; keep one")
+    return present[0]
+
+
+def read_table(
+    path: Path, required: list[tuple[str, ...]], optional: list[tuple[str, ...]], limits: Limits
+) -> dict[str, Floats]:
+    """Columns of a CSV file by their names; each optional group is there as a whole or not at all.
+
+    Raises:
+        ValueError: the file cannot be read, a column is missing or there twice, or a value is not a finite number or
+            out of its limits; the message names file and line.
+    """
+    lines = _lines(path)
+    header = [name.strip() for name in lines[0].split(",")] if lines else []
+    wanted: list[str] = []
+    for group in required + optional:
+        missing = [name for name in group if name not in header]
+        if missing and (group in required or len(missing) < len(group)):
+            raise ValueError(
+                f"{path}, line 1: column {missing[0]!r} is missing; needed together: {', '.join(group)}; "
+                f"found: {', '.join(header) or 'nothing'}"
+            )
+        if not missing:
+            wanted += group
+    twice = [name for name in wanted if header.count(name) > 1]
+    if twice:
+        raise ValueError(f"{path}, line 1: column {twice[0]!r} is there twice")
+    if len(lines) < 3:
+        raise ValueError(f"{path}: needs two lines of data or more below the header")
+    places = [header.index(name) for name in wanted]
+    try:
+        values = np.loadtxt(lines[1:], delimiter=",", usecols=places, comments=None, ndmin=2)
+    except ValueError:
+        values = None
+    if values is None or len(values) != len(lines) - 1 or not np.all(np.isfinite(values)):
+        raise _bad_value(path, lines, wanted, places)
+    for column, name in enumerate(wanted):
+        low, high = limits.get(name, (-math.inf, math.inf))
+        wrong = np.flatnonzero((values[:, column] < low) | (values[:, column] > high))
+        if len(wrong):
+            bounds = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
+            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {values[wrong[0], column]:g}")
+    return {name: np.ascontiguousarray(values[:, column]) for column, name in enumerate(wanted)}
+
+
+def check_increasing(path: Path, time: Floats) -> None:
+    """Times of the lines of a table, (n,), s.
+
+    Raises:
+        ValueError: a line is not later than the one before it.
+    """
+    late = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(late):
+        before, after = time[late[0]], time[late[0] + 1]
+        raise ValueError(f"{path}, line {late[0] + 3}: t_s must increase, got {after:.9g} after {before:.9g}")
+
+
+def _lines(path: Path) -> list[str]:
+    """Lines of a plain or gzipped text file, without blank ones at its end."""
+    data = path.read_bytes()
+    try:
+        if path.suffix == ".gz":
+            data = gzip.decompress(data)
+        text = data.decode("utf-8-sig")
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read: {error}") from None
+    return text.rstrip().splitlines()
+
+
+def _bad_value(path: Path, lines: list[str], wanted: list[str], places: list[int]) -> ValueError:
+    """The error that names the first line with a value that is not a finite number."""
+    for number, line in enumerate(lines[1:], start=2):
+        cells = line.split(",")
+        for name, place in zip(wanted, places, strict=True):
+            if place >= len(cells):
+                return ValueError(f"{path}, line {number}: {name} is missing, the line has {len(cells)} of the columns")
+            try:
+                valid = math.isfinite(float(cells[place])) and "_" not in cells[place]
+            except ValueError:
+                valid = False
+            if not valid:
+                return ValueError(
+                    f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()!r}"
+                )
+    return ValueError(f"{path}: cannot be read as a table of numbers")
