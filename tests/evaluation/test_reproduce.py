@@ -279,6 +279,20 @@ def test_liu_rows(liu):
     assert "unspoofed run 0 m" in gain.reason, "backtracking to before the onset leaves nothing of the attack"
 
 
+def test_liu_rows_on_fixes_from_ranges(liu):
+    """R stands for errors that stay: without an attack the bound is broken, and slow ramps are not seen."""
+    items = {row.item: row for row in liu.rows if row.item.startswith("ranges, ")}
+    assert len(items) == 8
+    statistic = items["ranges, not spoofed: mean of the normalised innovation squared"]
+    assert statistic.value < 0.5
+    assert statistic.verdict == "not reproduced"
+    for rate, share in ((0.3, 0.0), (0.5, 0.0), (1, 1.0)):
+        assert items[f"ranges, {rate:g} m/s: share of runs that the snapshot test detects"].value == share
+    final = items["ranges, 12.4 m/s: error in longitude at 1100 s, m (2 nautical miles)"]
+    # 3.8 km with white noise; four runs of 2.7 m each
+    assert final.value == pytest.approx(3785.0, abs=15.0)
+
+
 def test_liu_backtracking_equals_flying_without_an_attack():
     attacked, clean = (liu_2018.coasting_error(3, 7, rate, 50) for rate in (1.0, 0.0))
     np.testing.assert_allclose(attacked, clean, rtol=1e-12)
