@@ -6,8 +6,8 @@ beyond that of pure process noise, Γ_k = Φ_k Γ_(k-1) Φ_k' + Q_k,
 
     E_k = C_k⁻¹ (x_KF - x_unaided),        M_k = C_k⁻¹ (P_k - Γ_k) C_k⁻ᵀ,
 
-change at a correction only: -C_k⁻¹ U_k w_k and -C_k⁻¹ U_k U_k' C_k⁻ᵀ. A coasting keeps those of its departure. So along a
-direction u, with b_k = C_k' u,
+change at a correction only: -C_k⁻¹ U_k w_k and -C_k⁻¹ U_k U_k' C_k⁻ᵀ. A coasting keeps those of its departure. So along
+a direction u, with b_k = C_k' u,
 
     u' (x_KF - x_coast) = b_k' (E_k - E_j),        u' (P_coast - P_KF) u = b_k' (M_j - M_k) b_k,
 
@@ -86,7 +86,15 @@ def coasting_tables(model: TightModel, directions: tuple[int, ...], num_windows:
     prior = model.covariance[:, POSITION, POSITION][:, places, places]
     filtered = prior - np.add.reduce(position_gain**2, axis=1)
     return CoastingTables(
-        num_windows, places, inverse, projected, noise, response, variance, filtered[rows], _early(response, num_windows)
+        num_windows,
+        places,
+        inverse,
+        projected,
+        noise,
+        response,
+        variance,
+        filtered[rows],
+        _early(response, num_windows),
     )
 
 

@@ -327,6 +327,10 @@ class RangeNavigator(Navigator, Protocol):
     def position_gain(self) -> Floats:
         """U' of the position for the ranges of the present epoch, (N, m, 3), m."""
 
+    @property
+    def clock_error(self) -> Floats:
+        """Estimate minus truth of the receiver's clock, (N,), m."""
+
 
 class FilterView:
     """What the filter of some runs knows beside its innovation, before the present fix is resolved; never the truth.

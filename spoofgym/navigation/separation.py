@@ -54,7 +54,9 @@ class CoastingWindows:
             self._excess = np.zeros((len(self.age), PACKED, self._num_windows))
         return self._excess
 
-    def separate(self, tables: CoastingTables, row: Runs, whitened: Floats, limit: float) -> tuple[Floats, Floats, Floats]:
+    def separate(
+        self, tables: CoastingTables, row: Runs, whitened: Floats, limit: float
+    ) -> tuple[Floats, Floats, Floats]:
         """See an epoch of filters that use every range.
 
         Args:
@@ -317,17 +319,17 @@ def _bring_back(covariance: Floats, noise: Floats, inverse: Floats, work: Floats
     for i in range(NUM_STATES):
         for j in range(NUM_STATES):
             work[i, j] = 0.0
-        for l in range(NUM_STATES):
-            factor = inverse[i, l]
+        for c in range(NUM_STATES):
+            factor = inverse[i, c]
             if factor != 0.0:
                 for j in range(NUM_STATES):
-                    work[i, j] += factor * (covariance[l, j] - noise[l, j])
+                    work[i, j] += factor * (covariance[c, j] - noise[c, j])
     place = 0
     for i in range(NUM_STATES):
         for j in range(i + 1):
             total = 0.0
-            for l in range(NUM_STATES):
-                total += work[i, l] * inverse[j, l]
+            for c in range(NUM_STATES):
+                total += work[i, c] * inverse[j, c]
             packed[place] = total
             place += 1
 
