@@ -7,7 +7,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline
@@ -222,7 +222,11 @@ class TightScenario(Scenario):
         """Square roots of the covariance of the error, (n, n), and of the estimated biases, (6, 6)."""
         prior = self.tight_model(burn_in).prior_covariance
         biases = bias_variance(self.grade, self.timeline.interval, self._first(burn_in))
-        return semidefinite_factor(prior), semidefinite_factor(np.diag(biases) - prior[BIAS, BIAS])
+        estimated = np.diag(biases) - prior[BIAS, BIAS]
+        # a filter that begins less certain than the data sheet has not estimated such a bias yet
+        wider = np.diag(estimated) < 0.0
+        estimated[wider], estimated[:, wider] = 0.0, 0.0
+        return semidefinite_factor(prior), semidefinite_factor(estimated)
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
         """True error, then estimated biases, just before epoch -burn_in, (k, n + 6).
@@ -260,26 +264,20 @@ class TightScenario(Scenario):
         dynamics = self.tight_model(burn_in).dynamics
         direction = dynamics.line_of_sight[index]
         if fidelity == "linear":
-            code = -_along(direction, spoof.offset)
+            code = -along(direction, spoof.offset)
         else:
             nowhere = np.zeros_like(spoof.offset)
             code = self._distance(index, burn_in, spoof.offset) - self._distance(index, burn_in, nowhere)
         code += spoof.clock[:, None]
         second = code
         if self.observable == "rate":
-            second = spoof.clock_rate[:, None] - _along(direction, spoof.rate)
-        captured = dynamics.present[index]
-        if spoof.satellites is not None:
-            captured = captured & spoof.satellites
-        return np.concatenate([code * captured, second * captured], axis=1)
+            second = spoof.clock_rate[:, None] - along(direction, spoof.rate)
+        return captured_ranges(dynamics.present[index], spoof, code, second)
 
     def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
         """What multipath adds to the code at epochs 0..K, (k, K+1, m), so that a fix would err by ``multipath``."""
         direction = self.tight_model(burn_in).dynamics.line_of_sight[burn_in:]
-        added = np.zeros((*multipath.shape[:2], self.dimension))
-        for epoch in np.flatnonzero(multipath.any(axis=(0, 2))):
-            added[:, epoch, : self.slots] = -_along(direction[epoch][None], multipath[:, epoch])
-        return added
+        return disturbed_ranges(direction, multipath)
 
     def satellites(self, index: Runs, burn_in: int) -> Runs:
         """Number of the satellite in each slot, (k, S); -1 = none."""
@@ -297,7 +295,34 @@ class TightScenario(Scenario):
         return np.sqrt(satellites[..., 0] ** 2 + satellites[..., 1] ** 2 + satellites[..., 2] ** 2)
 
 
-def _along(direction: Floats, vector: Floats) -> Floats:
+def captured_ranges(present: Flags, spoof: Spoof, code: Floats, second: Floats) -> Floats:
+    """What a spoofer adds to code and second observable of the satellites that there are and that it captures, (k, m).
+
+    Args:
+        present: slots that hold a satellite, (k, S).
+        spoof: tells which are captured.
+        code: what it adds to each, (k, S), m.
+        second: likewise, m or m/s.
+    """
+    captured = present if spoof.satellites is None else present & spoof.satellites
+    return np.concatenate([code * captured, second * captured], axis=1)
+
+
+def disturbed_ranges(direction: Floats, multipath: Floats) -> Floats:
+    """What multipath adds to the code, (k, K+1, m), so that a fix would err by ``multipath``, (k, K+1, 3), m.
+
+    Args:
+        direction: unit vectors to the satellites at epochs 0..K, (K+1, S, 3), ENU.
+        multipath: its effect on fixes.
+    """
+    slots = direction.shape[1]
+    added = np.zeros((*multipath.shape[:2], 2 * slots))
+    for epoch in np.flatnonzero(multipath.any(axis=(0, 2))):
+        added[:, epoch, :slots] = -along(direction[epoch][None], multipath[:, epoch])
+    return added
+
+
+def along(direction: Floats, vector: Floats) -> Floats:
     """Components of vectors (k, 3) along unit vectors (k, S, 3), (k, S)."""
     return (
         direction[..., 0] * vector[:, None, 0]

@@ -31,7 +31,7 @@ from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
 from spoofgym.scenario import FIDELITIES, Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.scenarios.recorded import RecordedScenario
+from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from train.arguments import above_one, count, picture, seed_number
 from train.attackers import Evaluation
 from train.defenders import POPULATIONS, evaluate_defenders

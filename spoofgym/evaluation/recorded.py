@@ -17,7 +17,7 @@ from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.geodesy import position_difference
 from spoofgym.navigation.mechanization import mechanize
 from spoofgym.scenarios.log import interpolate
-from spoofgym.scenarios.recorded import RecordedScenario
+from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.simulation import Simulation
 
 SETTLING = 30.0

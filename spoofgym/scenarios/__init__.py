@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
+from spoofgym import validation
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.foi_drive import foi_drive
 from spoofgym.scenarios.kujur_flight import kujur_flight
@@ -12,7 +15,7 @@ from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.shadmehri_flight import shadmehri_flight
 from spoofgym.scenarios.song_robot import song_robot
-from spoofgym.specification import build
+from spoofgym.specification import Specification, build
 
 SCENARIOS: dict[str, Callable[..., Scenario]] = {
     "foi-drive": foi_drive,
@@ -23,16 +26,48 @@ SCENARIOS: dict[str, Callable[..., Scenario]] = {
     "song-robot": song_robot,
 }
 
+COUPLINGS = ("loose", "tight")
+
 
 @lru_cache(maxsize=32)
 def _build(text: str) -> Scenario:
     return build(text, SCENARIOS, "scenario")
 
 
-def make_scenario(scenario: str | Scenario) -> Scenario:
+def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scenario:
     """The scenario that a specification names; an object is returned as it is.
 
+    Args:
+        scenario: the specification, or an object.
+        coupling: that its filter must have, ``loose`` or ``tight``: ``coupling=`` is added to a specification that has
+            this option and does not use it; None = what the scenario is.
+
     Raises:
-        ValueError: unknown name or option, or a value that does not fit; the message lists the valid ones.
+        ValueError: unknown name or option, a value that does not fit (the message lists the valid ones), or a scenario
+            of the other coupling.
     """
-    return scenario if isinstance(scenario, Scenario) else _build(scenario)
+    if coupling is None:
+        return scenario if isinstance(scenario, Scenario) else _build(scenario)
+    validation.one_of("scenario", "coupling", coupling, COUPLINGS)
+    made = _build(_with_coupling(scenario, coupling)) if isinstance(scenario, str) else make_scenario(scenario)
+    if made.coupling != coupling:
+        choose = ", ".join(name for name in SCENARIOS if _takes_coupling(name))
+        raise ValueError(
+            f"scenario {made.name!r} is {made.coupling}ly coupled, not {coupling}ly; with coupling=loose or "
+            f"coupling=tight: {choose}"
+        )
+    return made
+
+
+def _takes_coupling(name: str) -> bool:
+    return name in SCENARIOS and "coupling" in inspect.signature(SCENARIOS[name]).parameters
+
+
+def _with_coupling(text: str, coupling: str) -> str:
+    """The specification with this coupling, if its scenario has the option and it says nothing of it."""
+    given = Specification.parse(text)
+    if not _takes_coupling(given.name) or "coupling" in given.options:
+        return text
+    if given.value is not None and next(iter(inspect.signature(SCENARIOS[given.name]).parameters)) == "coupling":
+        return text
+    return str(replace(given, options={**given.options, "coupling": coupling}))

@@ -1,7 +1,8 @@
-"""The filter of a recorded log on its unspoofed fixes."""
+"""The filter of a recorded log on its unspoofed fixes, or ranges."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,12 @@ from spoofgym.arrays import Floats
 from spoofgym.navigation.interface import Decision
 from spoofgym.navigation.loose import StrapdownNavigator
 from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.navigation.tight_strapdown import TightStrapdownNavigator
 from spoofgym.navigation.warm_start import NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
+
+NUM_BIASES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,21 +38,52 @@ class CleanRun:
     covariance: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class TightCleanRun(CleanRun):
+    """That of a filter on ranges, with its P of all states, (E + 1, n, n).
+
+    Attributes:
+        state: what the filter estimates beside the inertial states, less the reference of `RecordedRanges`, (E + 1, n).
+    """
+
+    state: Floats
+
+
 def clean_run(model: StrapdownModel) -> CleanRun:
     """Run the filter over all epochs of a model, every fix used."""
     navigator = StrapdownNavigator(model, 1, RunSlices(1))
-    navigator.reset(np.array([0]), np.zeros((1, NUM_JOINT)), RunStreams.from_seed(0, 1))
+    return CleanRun(*_states(navigator, np.zeros(NUM_JOINT), np.zeros((len(model.time), model.dimension))))
+
+
+def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> TightCleanRun:
+    """Run the filter over all epochs of a navigator of one run, every range used.
+
+    Args:
+        navigator: of the log.
+        deviation: of the ranges from those of its reference, (E, m), m and m/s.
+    """
+    state = navigator.state
+    parts = _states(navigator, np.zeros(state.shape[1] + NUM_BIASES), deviation, lambda: state)
+    return TightCleanRun(*parts)
+
+
+def _states(
+    navigator: StrapdownNavigator, initial: Floats, deviation: Floats, *more: Callable[[], Floats]
+) -> list[Floats]:
+    """Attitude, velocity, position, bias, P, and more, before the first epoch and after each, (E + 1, ...)."""
+    navigator.reset(np.array([0]), initial[None], RunStreams.from_seed(0, 1))
     use = Decision(np.ones(1, dtype=bool))
-    states: list[tuple[Floats, ...]] = []
+    states: list[list[Floats]] = []
 
     def keep() -> None:
-        parts = (navigator.attitude, navigator.velocity, navigator.position, navigator.bias, navigator.covariance)
-        states.append(tuple(part[0].copy() for part in parts))
+        parts = [navigator.attitude, navigator.velocity, navigator.position, navigator.bias, navigator.covariance]
+        parts += [part() for part in more]
+        states.append([part[0].copy() for part in parts])
 
     keep()
-    for _ in range(len(model.time)):
+    for measured in deviation:
         navigator.propagate()
-        navigator.innovate(np.zeros((1, model.dimension)))
+        navigator.innovate(measured[None])
         navigator.resolve(use)
         keep()
-    return CleanRun(*(np.stack(part) for part in zip(*states, strict=True)))
+    return [np.stack(part) for part in zip(*states, strict=True)]

@@ -73,9 +73,19 @@ def range_fixes(log: Log) -> Fixes:
     if not has_table(log.folder, "ranges"):
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) to make fixes from")
     solution = solve_ranges(read_ranges(log.folder), log.fixes.position[0])
+    return fixes_of(solution, range_delay(log, solution))
+
+
+def fixes_of(solution: RangeSolution, delay: float) -> Fixes:
+    """The epochs that are solved as fixes.
+
+    Args:
+        solution: of the ranges.
+        delay: how much later than on the log's clock they are received, s.
+    """
     solved = solution.solved
     return Fixes(
-        time=solution.corrected.geometry.time[solved] - range_delay(log, solution),
+        time=solution.corrected.geometry.time[solved] - delay,
         position=solution.position[solved],
         velocity=solution.velocity[solved],
         position_sigma=solution.position_sigma[solved],

@@ -1,0 +1,180 @@
+"""The ranges of a recorded log as epochs of a filter: at a steady rate, on the clock of the IMU, with what is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.geodesy import displace, position_difference
+from spoofgym.scenarios.log import Fixes, Log
+from spoofgym.scenarios.range_fixes import RangeSolution, fixes_of, range_delay, solve_ranges
+from spoofgym.scenarios.ranges_log import Ranges, correct, read_ranges
+from spoofgym.scenarios.table import has_table
+from spoofgym.sensors.geometry import SatelliteGeometry
+
+UNSTEADY = 0.1
+"""Share of the interval between epochs by which one may come early or late."""
+
+
+@dataclass(frozen=True, eq=False)
+class RangeEpochs:
+    """Ranges at E epochs, equally spaced on the receiver's clock, in a slot for each of S satellites.
+
+    An epoch in which the receiver gave nothing has empty slots. A satellite counts where both its code and its range
+    rate are usable, and neither is one that a fix of the epoch leaves out as faulty (`without_faults`).
+
+    Attributes:
+        time: on the clock of the IMU, (E,), s.
+        interval: between epochs, s.
+        geometry: of the satellites that count.
+        started: where a satellite counts for the first time, (E, S).
+        code: pseudorange, corrected for all but the receiver's clock and errors, (E, S), m.
+        code_sigma: (E, S), m.
+        rate: range rate, corrected likewise, (E, S), m/s.
+        rate_sigma: (E, S), m/s.
+        position: of the receiver, by least squares and straight lines between its fixes: latitude rad, longitude rad,
+            height m, (E, 3).
+        velocity: likewise, ENU, (E, 3), m/s.
+        clock: likewise, offset of the receiver's clock as a range, (E,), m.
+        clock_drift: likewise, (E,), m/s.
+        fix: epochs that have a fix, (n,).
+        fixes: of these epochs, on the clock of the IMU.
+    """
+
+    time: Floats
+    interval: float
+    geometry: SatelliteGeometry
+    started: Flags
+    code: Floats
+    code_sigma: Floats
+    rate: Floats
+    rate_sigma: Floats
+    position: Floats
+    velocity: Floats
+    clock: Floats
+    clock_drift: Floats
+    fix: Runs
+    fixes: Fixes
+
+    def part(self, first: int, last: int) -> RangeEpochs:
+        """Epochs first..last-1 of these, with all the fixes."""
+
+        def cut(owner: Any, whole: tuple[str, ...] = ()) -> dict[str, Any]:
+            return {
+                item.name: getattr(owner, item.name)[first:last] for item in fields(owner) if item.name not in whole
+            }
+
+        geometry = SatelliteGeometry(**cut(self.geometry))
+        return replace(self, geometry=geometry, **cut(self, ("interval", "geometry", "fix", "fixes")))
+
+
+def range_epochs(log: Log) -> RangeEpochs:
+    """The ranges of a log as epochs of a filter.
+
+    Raises:
+        ValueError: the log has no ranges, they cannot be used or come unsteadily, hardly any gives a fix, or the drive
+            does not tell their delay.
+    """
+    if not has_table(log.folder, "ranges"):
+        raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) for a filter to take")
+    ranges = steady(read_ranges(log.folder), str(log.folder))
+    solution = solve_ranges(ranges, log.fixes.position[0])
+    number = int(solution.solved.sum())
+    if number < 2:
+        raise ValueError(f"log {str(log.folder)!r}: ranges must give a fix in 2 epochs or more, they do in {number}")
+    delay = range_delay(log, solution)
+    position, velocity, clock, drift = _between_fixes(solution)
+    corrected = correct(ranges, position, clock)
+    counts = corrected.geometry.present & solution.used & solution.used_rate
+    slots = counts.any(axis=0)
+    counts = counts[:, slots]
+
+    def kept(values: Any, empty: Any = 0.0) -> Any:
+        there = counts.reshape(counts.shape + (1,) * (values.ndim - 2))
+        return np.where(there, values[:, slots], empty)
+
+    geometry = corrected.geometry
+    return RangeEpochs(
+        time=geometry.time - delay,
+        interval=float(np.median(np.diff(geometry.time))),
+        geometry=SatelliteGeometry(
+            time=geometry.time,
+            satellite=kept(geometry.satellite, -1),
+            position=kept(geometry.position),
+            velocity=kept(geometry.velocity),
+            line_of_sight=kept(geometry.line_of_sight),
+            elevation=kept(geometry.elevation),
+            azimuth=kept(geometry.azimuth),
+        ),
+        started=counts & (np.cumsum(counts, axis=0) == 1),
+        code=kept(corrected.pseudorange),
+        code_sigma=kept(corrected.sigma),
+        rate=kept(corrected.range_rate),
+        rate_sigma=kept(corrected.rate_sigma),
+        position=position,
+        velocity=velocity,
+        clock=clock,
+        clock_drift=drift,
+        fix=np.flatnonzero(solution.solved),
+        fixes=fixes_of(solution, delay),
+    )
+
+
+def steady(ranges: Ranges, owner: str) -> Ranges:
+    """The ranges with an empty epoch wherever the receiver's steady rate asks for one and there is none.
+
+    Args:
+        ranges: of a receiver.
+        owner: where they come from, for the message.
+
+    Raises:
+        ValueError: an epoch lies between those of the steady rate, or there are fewer than two.
+    """
+    if len(ranges.time) < 2:
+        raise ValueError(f"{owner}: ranges of 2 epochs or more are needed, got {len(ranges.time)}")
+    interval = float(np.median(np.diff(ranges.time)))
+    steps = np.diff(ranges.time) / interval
+    number = np.maximum(np.round(steps), 1.0)
+    off = np.flatnonzero(np.abs(steps - number) > UNSTEADY)
+    if len(off):
+        raise ValueError(
+            f"{owner}: ranges must come at a steady rate: after {ranges.time[off[0]]:.9g} s the next come "
+            f"{steps[off[0]] * interval:.4g} s later, with a median of {interval:.4g} s"
+        )
+    place = np.concatenate([[0], np.cumsum(number).astype(np.int64)])
+    epochs = place[-1] + 1
+
+    def spread(values: Any, empty: float) -> Any:
+        result = np.full((epochs, values.shape[1]), empty, dtype=values.dtype)
+        result[place] = values
+        return result
+
+    return replace(
+        ranges,
+        time=np.interp(np.arange(epochs), place, ranges.time),
+        satellite=spread(ranges.satellite, -1),
+        pseudorange=spread(ranges.pseudorange, 0.0),
+        range_rate=spread(ranges.range_rate, 0.0),
+        has_rate=spread(ranges.has_rate, False),
+        cn0=spread(ranges.cn0, 0.0),
+    )
+
+
+def _between_fixes(solution: RangeSolution) -> tuple[Floats, Floats, Floats, Floats]:
+    """Position, velocity, clock and its drift of every epoch, by straight lines between the epochs with a fix."""
+    solved, every = np.flatnonzero(solution.solved), np.arange(len(solution.solved))
+
+    def line(values: Floats) -> Floats:
+        return np.interp(every, solved, values[solved])
+
+    origin = solution.position[solved[0]]
+    track = position_difference(np.where(solution.solved[:, None], solution.position, origin), origin)
+    return (
+        displace(origin, np.column_stack([line(track[:, a]) for a in range(3)])),
+        np.column_stack([line(solution.velocity[:, a]) for a in range(3)]),
+        line(solution.clock),
+        line(solution.clock_drift),
+    )

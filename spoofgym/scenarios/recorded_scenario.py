@@ -1,0 +1,277 @@
+"""What every recorded game has in common: a log, its alignment, and epochs that need not be equally spaced."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from spoofgym.arrays import Floats
+from spoofgym.geodesy import position_difference
+from spoofgym.navigation.interface import Timeline
+from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.navigation.tuning import FilterTuning
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios.alignment import Alignment, align
+from spoofgym.scenarios.clean_run import CleanRun
+from spoofgym.scenarios.log import Log, interpolate
+from spoofgym.sensors.imu import ImuGrade
+
+MAX_IMU_GAP = 0.5
+"""Longest time between inertial samples inside a game, s."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedScenario(Scenario):
+    """A game on a log, in the strapdown fidelity. The filter is aligned on its fixes and runs from there.
+
+    ``timeline.interval`` is the median of those between the epochs.
+
+    Attributes:
+        name: the specification that builds it.
+        log: the recording; its fixes are those that the alignment takes.
+        grade: of the IMU, as the filter believes.
+        tuning: what the filter believes beside it.
+        onset: latest time of epoch 0, the last clean epoch, s; None = a third of the way from the log's start to its
+            end.
+        horizon: epochs of the game; None = to the end of the log.
+        drag_off_rate: largest rate of the spoofed position per axis, m/s.
+        error_scale: metres of error that make a reward of 1.
+    """
+
+    fidelities = ("strapdown",)
+    matched = False
+    random = False
+
+    name: str
+    log: Log
+    grade: ImuGrade
+    tuning: FilterTuning
+    onset: float | None = None
+    horizon: int | None = None
+    drag_off_rate: tuple[float, float, float] = (4.0, 4.0, 4.0)
+    error_scale: float = 10.0
+
+    def __post_init__(self) -> None:
+        self._check_imu(self.epoch_time[self.first], self.epoch_time[self.last])
+
+    @property
+    @abstractmethod
+    def epoch_time(self) -> Floats:
+        """Times of all epochs after the alignment, (E,), s."""
+
+    @property
+    @abstractmethod
+    def model(self) -> StrapdownModel:
+        """Inertial samples and prior of all epochs after the alignment."""
+
+    @property
+    @abstractmethod
+    def clean(self) -> CleanRun:
+        """The filter on unspoofed measurements, from the alignment to the end of the log."""
+
+    @property
+    @abstractmethod
+    def _prior_sigma(self) -> Floats:
+        """Of the error of the alignment, (15,)."""
+
+    @property
+    def align_time(self) -> float:
+        """Of the fix that the filter starts from, s."""
+        return float(self.log.fixes.time[self.alignment.fix])
+
+    @cached_property
+    def _end(self) -> float:
+        """As far as IMU and reference reach, s.
+
+        Raises:
+            ValueError: the reference begins after the alignment.
+        """
+        log, end = self.log, float(self.log.imu_time[-1])
+        if log.reference is None:
+            return end
+        if log.reference.time[0] > self.align_time:
+            raise ValueError(
+                f"scenario {self.name!r}: the reference begins at {log.reference.time[0]:g} s, after the alignment "
+                f"at {self.align_time:g} s; move start_s in log.toml"
+            )
+        return min(end, float(log.reference.time[-1]))
+
+    @cached_property
+    def alignment(self) -> Alignment:
+        """Where the filter starts."""
+        return align(self.log)
+
+    @cached_property
+    def first(self) -> int:
+        """Epoch 0 of the game, counted from the first epoch after the alignment.
+
+        Raises:
+            ValueError: the onset lies outside the log, or the horizon reaches beyond it.
+        """
+        time = self.epoch_time
+        onset = self.onset
+        if onset is None:
+            begin = max(self.log.start, self.log.fixes.time[0])
+            onset = begin + (time[-1] - begin) / 3.0
+            onset = min(max(onset, time[0]), time[-2])
+        if not time[0] <= onset < time[-1]:
+            raise ValueError(
+                f"scenario {self.name!r}: onset {onset:g} s lies outside the log: valid from {time[0]:g} s (the first "
+                f"fix after the alignment) to {time[-2]:g} s"
+            )
+        first = int(np.searchsorted(time, onset + 1e-9, side="right")) - 1
+        longest = len(time) - 1 - first
+        if self.horizon is not None and not 1 <= self.horizon <= longest:
+            raise ValueError(
+                f"scenario {self.name!r}: horizon {self.horizon} does not fit: valid from 1 to {longest} epochs after "
+                f"{onset:g} s"
+            )
+        return first
+
+    @property
+    def last(self) -> int:
+        """The last epoch of the game, counted likewise."""
+        return len(self.epoch_time) - 1 if self.horizon is None else self.first + self.horizon
+
+    @property
+    def timeline(self) -> Timeline:  # type: ignore[override]
+        """The epochs of the game."""
+        time = self.epoch_time[self.first : self.last + 1]
+        return Timeline(float(time[0]), float(np.median(np.diff(time))), len(time) - 1)
+
+    def _check_imu(self, onset: float, end: float) -> None:
+        time, begin = self.log.imu_time, self.align_time
+        gaps = np.flatnonzero((np.diff(time) > MAX_IMU_GAP) & (time[1:] > begin) & (time[:-1] < end))
+        if len(gaps):
+            at, length = time[gaps[0]], time[gaps[0] + 1] - time[gaps[0]]
+            remedy = "a smaller horizon ends the game before it" if at > onset else "a later start_s begins after it"
+            raise ValueError(
+                f"scenario {self.name!r}: the IMU has a gap of {length:.3g} s at {at:g} s; valid is at most "
+                f"{MAX_IMU_GAP:g} s between the alignment at {begin:g} s and the end of the game at {end:g} s; {remedy}"
+            )
+
+    @cached_property
+    def _truth(self) -> tuple[Floats, Floats] | None:
+        """Position and velocity (ENU, m/s) of the reference at the epochs, (E, 3) each; None = the log has none."""
+        reference = self.log.reference
+        return None if reference is None else interpolate(reference, self.epoch_time)
+
+    def _inertial_model(self, position: Floats, velocity: Floats, covariance: Floats) -> StrapdownModel:
+        """The samples of all epochs after the alignment, as straight lines cut so that a step ends at each epoch.
+
+        Args:
+            position: of the fixes, and of the truth where the log has no reference, (E, 3).
+            velocity: likewise, (E, 3), ENU, m/s.
+            covariance: the filter's R of fixes, (E, m, m).
+        """
+        log, time = self.log, self.epoch_time
+        ends = np.concatenate([[self.align_time], time])
+        inside = (log.imu_time > self.align_time) & (log.imu_time < time[-1])
+        grid = np.union1d(log.imu_time[inside], ends)
+
+        def means(samples: Floats) -> Floats:
+            """Of straight lines between the samples, over each step of the grid."""
+            at = np.column_stack([np.interp(grid, log.imu_time, samples[:, a]) for a in range(3)])
+            return np.asarray(0.5 * (at[1:] + at[:-1]))
+
+        return StrapdownModel(
+            time=time,
+            angular_rate=means(log.angular_rate),
+            specific_force=means(log.specific_force),
+            step=np.diff(grid),
+            boundaries=np.searchsorted(grid, ends).astype(np.int64),
+            fix_position=position,
+            fix_velocity=velocity,
+            true_position=position if self._truth is None else self._truth[0],
+            true_velocity=velocity if self._truth is None else self._truth[1],
+            lever_arm=np.zeros(3),
+            latency_samples=0,
+            measurement_covariance=covariance,
+            filter_density=self.tuning.noise_density(self.grade),
+            true_noise=np.zeros(9),
+            instability_sigma=np.zeros(6),
+            instability_decay=1.0,
+            attitude=self.alignment.attitude,
+            velocity=self.alignment.velocity,
+            position=self.alignment.position,
+            prior_covariance=np.diag(np.square(self.tuning.initial_scale * self._prior_sigma)),
+        )
+
+    def _game_model(self, first: int) -> StrapdownModel:
+        """The part of `model` from an epoch to the end of the game, begun from the clean run's filter."""
+        stop, whole, clean = self.last + 1, self.model, self.clean
+        return replace(
+            whole,
+            time=whole.time[first:stop],
+            boundaries=whole.boundaries[first : stop + 1],
+            fix_position=whole.fix_position[first:stop],
+            fix_velocity=whole.fix_velocity[first:stop],
+            true_position=self.true_position[first:stop],
+            true_velocity=self.true_velocity[first:stop],
+            measurement_covariance=whole.measurement_covariance[first:stop],
+            attitude=clean.attitude[first],
+            velocity=clean.velocity[first],
+            position=clean.position[first],
+            prior_covariance=clean.covariance[first],
+        )
+
+    def _check_clean(self, run: CleanRun) -> None:
+        """Refuse a clean run that went astray.
+
+        Raises:
+            ValueError: its position is not finite.
+        """
+        if not np.all(np.isfinite(run.position)):
+            raise ValueError(
+                f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade"
+            )
+
+    @cached_property
+    def true_position(self) -> Floats:
+        """Of all epochs after the alignment, (E, 3): the reference's, else the clean run's."""
+        return self.clean.position[1:] if self._truth is None else self._truth[0]
+
+    @property
+    def true_velocity(self) -> Floats:
+        """Of all epochs after the alignment, (E, 3), ENU, m/s: the reference's, else the clean run's."""
+        return self.clean.velocity[1:] if self._truth is None else self._truth[1]
+
+    def _first(self, burn_in: int) -> int:
+        if burn_in > self.first:
+            raise ValueError(
+                f"scenario {self.name!r}: a detector looks back {burn_in} epochs, but there are {self.first} between "
+                f"the alignment and the onset at {self.timeline.start:g} s: begin later"
+            )
+        return self.first - burn_in
+
+    @property
+    def bias_sigma(self) -> Floats:
+        """Data-sheet bias of the IMU grade that the filter believes in, (6,), rad/s and m/s²."""
+        return np.hypot(self.grade.bias_sigma, self.grade.instability_sigma)
+
+    def times(self, burn_in: int) -> Floats:
+        """Log time of the epochs -burn_in..K, s."""
+        return self.epoch_time[self._first(burn_in) : self.last + 1]
+
+    def velocity(self, burn_in: int = 0) -> Floats:
+        """The velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s: the reference's, else the clean run's."""
+        return self.true_velocity[self._first(burn_in) : self.last + 1]
+
+    def track(self) -> Floats:
+        """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
+        position = self.true_position[self.first : self.last + 1]
+        return position_difference(position, position[0])
+
+    def linear_model(self, burn_in: int = 0) -> LinearModel:
+        """A log has none.
+
+        Raises:
+            ValueError: always; the message says what is valid instead.
+        """
+        raise ValueError(
+            f"scenario {self.name!r}: a recorded log has no linear model: knowledge must be 'blind' and action 'rate'"
+        )

@@ -1,0 +1,265 @@
+"""A recorded drive or flight as a game on its ranges, which a tightly coupled filter takes.
+
+As on recorded fixes, nothing is drawn: the samples and the ranges carry their own errors. What lies between the ranges
+of the log and those of a reference trajectory is replayed to the filter, and the spoofer adds to it. The reference is
+that of the log, or else the unspoofed run of the same filter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.geodesy import displace, geodetic_to_ecef
+from spoofgym.navigation.closed_loop import mechanize_epoch
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
+from spoofgym.navigation.interface import Demands, Spoof
+from spoofgym.navigation.linear_model import ErrorDynamics
+from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.navigation.tight_model import TightDynamics, TightModel, cold_covariance, tight_dynamics, tight_model
+from spoofgym.navigation.tight_replay import TightReplayNavigator
+from spoofgym.navigation.tight_states import BIAS, CLOCK
+from spoofgym.parallel import RunSlices
+from spoofgym.scenarios.clean_run import TightCleanRun, tight_clean_run
+from spoofgym.scenarios.range_epochs import RangeEpochs
+from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.sensors.ranging import KUJUR, DrawnErrors, RangeErrors, pseudoranges
+from spoofgym.streams import RunStreams
+from spoofgym.tight_scenario import along, captured_ranges, disturbed_ranges
+
+ERRORS = replace(KUJUR, code_multipath_sigma=0.0)
+"""Slow errors of a satellite, the troposphere, and the clock of a usual quartz oscillator, as in Kujur 2024. Multipath
+has no state of its own: `CODE_SIGMA` is twice the white noise on its account, and it would count a second time."""
+CLOCK_SIGMA = (100.0, 10.0)
+"""Initial uncertainty of the receiver's clock, m and m/s: ten times that of a fix, which is where it begins."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedRanges(RecordedScenario):
+    """A game on the ranges of a log, for a tightly coupled filter; epochs are equally spaced, some without satellites.
+
+    White noise of code and range rate follows from C/N0, as that of the fixes made from them. The slow errors of each
+    satellite, the troposphere and the clock are those of ``errors``. The filter is not matched: nobody knows the errors
+    of a log.
+
+    Attributes:
+        epochs: the ranges.
+        errors: what the filter believes of slow errors and of the clock; its noise of code and rate is not read.
+    """
+
+    coupling = "tight"
+    offers = (INERTIAL_SOLUTION, RANGES)
+    clock_rate = 4.0
+
+    epochs: RangeEpochs
+    errors: RangeErrors = ERRORS
+
+    @property
+    def slots(self) -> int:  # type: ignore[override]
+        """S, satellites of the log."""
+        return self.epochs.geometry.num_slots
+
+    @property
+    def dimension(self) -> int:  # type: ignore[override]
+        """m, of the ranges of all slots."""
+        return 2 * self.slots
+
+    @property
+    def facts(self) -> FilterFacts:
+        """What the designer of the filter knows."""
+        return replace(super().facts, tight_model=self.tight_model)
+
+    @cached_property
+    def ranges(self) -> RangeEpochs:
+        """Those after the alignment, as far as IMU and reference reach.
+
+        Raises:
+            ValueError: too few.
+        """
+        start = int(self.epochs.fix[self.alignment.fix]) + 1
+        stop = int(np.searchsorted(self.epochs.time, self._end, side="right"))
+        if stop - start < 4:
+            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {self.align_time:g} s")
+        return self.epochs.part(start, stop)
+
+    @property
+    def epoch_time(self) -> Floats:
+        """Times of all epochs after the alignment, (E,), s."""
+        return self.ranges.time
+
+    @property
+    def _prior_sigma(self) -> Floats:
+        sigma = self.tuning.initial_sigma(self.grade)
+        stated = self.log.fixes.position_sigma
+        assert stated is not None
+        sigma[6:9] = stated[self.alignment.fix]
+        return sigma
+
+    @cached_property
+    def model(self) -> StrapdownModel:
+        """The inertial part of all epochs after the alignment; fixes from ranges where the log has no reference."""
+        ranges = self.ranges
+        return self._inertial_model(
+            ranges.position, ranges.velocity, np.broadcast_to(np.eye(3), (len(ranges.time), 3, 3))
+        )
+
+    @cached_property
+    def dynamics(self) -> TightDynamics:
+        """What the filter believes of all epochs after the alignment; Φ and Q of the navigation states are left out."""
+        ranges, epochs = self.ranges, len(self.epoch_time)
+        inertial = ErrorDynamics(
+            transition=np.zeros((epochs, NUM_STATES, NUM_STATES)),
+            process_noise=np.zeros((epochs, NUM_STATES, NUM_STATES)),
+            true_noise=np.zeros((epochs, NUM_NAVIGATION, NUM_NAVIGATION)),
+            observation=np.zeros((epochs, 0, NUM_NAVIGATION)),
+        )
+        steady = tight_dynamics(inertial, self.grade, self.errors, ranges.geometry, ranges.interval, "rate")
+        sigma = np.concatenate([ranges.code_sigma, ranges.rate_sigma], axis=1)
+        return replace(
+            steady,
+            time=ranges.time,
+            started=ranges.started,
+            noise_variance=np.where(np.tile(ranges.geometry.present, 2), sigma**2, 1.0),
+        )
+
+    def deviation(self, position: Floats, velocity: Floats) -> Floats:
+        """The ranges of the log minus those of a reference with a steady clock, (E, m), m and m/s.
+
+        The clock of the reference starts with that of the first epoch and keeps its drift; it is there to keep the
+        numbers small.
+
+        Args:
+            position: of the reference at all epochs after the alignment, (E, 3), latitude rad, longitude rad, height m.
+            velocity: likewise, (E, 3), ENU, m/s.
+        """
+        ranges = self.ranges
+        since = ranges.time - ranges.time[0]
+        drift = np.full(len(since), ranges.clock_drift[0])
+        clock = np.column_stack([ranges.clock[0] + drift * since, drift])
+        none = np.zeros(ranges.code.shape)
+        expected = pseudoranges(ranges.geometry, position, velocity, DrawnErrors(none, none, none, clock))
+        measured = np.concatenate([ranges.code, ranges.rate], axis=1)
+        return (measured - np.concatenate([expected.code, expected.rate], axis=1)) * np.tile(ranges.geometry.present, 2)
+
+    @cached_property
+    def _cold(self) -> Floats:
+        """The filter's P at the alignment, (n, n)."""
+        sigma = self.tuning.initial_scale * self._prior_sigma
+        return cold_covariance(sigma, CLOCK_SIGMA, self.errors, self.slots)
+
+    @cached_property
+    def clean(self) -> TightCleanRun:
+        """The filter on the unspoofed ranges, from the alignment to the end of the log.
+
+        Without a reference it runs twice: along the fixes of the ranges, and along its own first solution, so that a
+        game, whose reference is the clean run, has the same lines of sight.
+        """
+        run = self._clean_along(self.model)
+        self._check_clean(run)
+        if self._truth is None:
+            run = self._clean_along(replace(self.model, true_position=run.position[1:], true_velocity=run.velocity[1:]))
+        return run
+
+    def _clean_along(self, model: StrapdownModel) -> TightCleanRun:
+        satellites, unknown = self.ranges.geometry.position, np.zeros(len(self.epoch_time))
+        tight = _bare(self.dynamics, self._cold)
+        navigator = TightReplayNavigator(model, tight, satellites, unknown, 1, RunSlices(1))
+        return tight_clean_run(navigator, self.deviation(model.true_position, model.true_velocity))
+
+    @cached_property
+    def _measured(self) -> Floats:
+        """Deviation of the ranges from those of the truth, (E, m)."""
+        return self.deviation(self.true_position, self.true_velocity)
+
+    def _dynamics(self, burn_in: int) -> TightDynamics:
+        return self.dynamics.part(self._first(burn_in), self.last + 1)
+
+    def navigator(
+        self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
+    ) -> TightReplayNavigator:
+        """A navigator that starts from the clean run's filter before epoch -burn_in; arguments as in `Scenario`."""
+        self.check_fidelity(fidelity)
+        first, stop = self._first(burn_in), self.last + 1
+        tight = _bare(self._dynamics(burn_in), self.clean.covariance[first])
+        satellites, clock = self.ranges.geometry.position[first:stop], self.clean.state[first + 1 : stop + 1, CLOCK]
+        return TightReplayNavigator(self._game_model(first), tight, satellites, clock, num_runs, slices, demands)
+
+    @cache  # noqa: B019 - scenarios live as long as the program
+    def tight_model(self, burn_in: int = 0) -> TightModel:
+        """The covariances of the game along the clean run, from epoch -burn_in on, every range used."""
+        first, stop = self._first(burn_in), self.last + 1
+        transition, noise = self._transitions(first, stop)
+        dynamics = replace(self._dynamics(burn_in), transition=transition, process_noise=noise)
+        return tight_model(dynamics, self.clean.covariance[first])
+
+    def _transitions(self, first: int, stop: int) -> tuple[Floats, Floats]:
+        """Φ (e, 9, 15) and Q (e, 9, 9) of the navigation states over epochs first..stop-1 of the clean run."""
+        model, clean = self.model, self.clean
+        transition = np.empty((stop - first, NUM_NAVIGATION, NUM_STATES))
+        noise = np.empty((stop - first, NUM_NAVIGATION, NUM_NAVIGATION))
+        density = np.diag(model.filter_density[:NUM_NAVIGATION])
+        for k in range(first, stop):
+            attitude, velocity, position = clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy()
+            interval = mechanize_epoch(
+                model.boundaries[k],
+                model.boundaries[k + 1],
+                0,
+                -clean.bias[k],
+                np.empty(0),
+                model.angular_rate,
+                model.specific_force,
+                model.step,
+                model.true_noise,
+                attitude,
+                velocity,
+                position,
+                np.empty((6, 3)),
+                np.empty(3),
+                transition[k - first],
+            )
+            phi, half = transition[k - first, :, :NUM_NAVIGATION], 0.5 * interval * density
+            noise[k - first] = phi @ half @ phi.T + half
+        return transition, noise
+
+    def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
+        """No error but the biases', and what the clean run's filter estimates before epoch -burn_in, (k, n + 6)."""
+        first, clean = self._first(burn_in), self.clean
+        state, bias = clean.state[first].copy(), clean.bias[first]
+        state[BIAS] = -bias
+        return np.tile(np.concatenate([state, bias]), (len(runs), 1))
+
+    def draw_receiver_noise(self, runs: Runs, initial: Floats, burn_in: int, streams: RunStreams) -> Floats:
+        """The log's ranges minus those of the truth at the epochs -burn_in..K, (k, burn_in + K + 1, m), m and m/s."""
+        return np.tile(self._measured[self._first(burn_in) : self.last + 1], (len(runs), 1, 1))
+
+    def spoofed(self, fidelity: str, index: Runs, burn_in: int, spoof: Spoof) -> Floats:
+        """What a spoofer adds to the ranges, (k, m): they become those of a receiver at the offset, its clock moved."""
+        place = self._first(burn_in) + index
+        geometry, truth = self.ranges.geometry, self.true_position[place]
+        satellites = geometry.position[place]
+        code = _distance(satellites, displace(truth, spoof.offset)) - _distance(satellites, truth)
+        rate = spoof.clock_rate[:, None] - along(geometry.line_of_sight[place], spoof.rate)
+        return captured_ranges(geometry.present[place], spoof, code + spoof.clock[:, None], rate)
+
+    def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
+        """What multipath adds to the code at epochs 0..K, (k, K+1, m), so that a fix would err by ``multipath``."""
+        return disturbed_ranges(self.ranges.geometry.line_of_sight[self.first : self.last + 1], multipath)
+
+    def satellites(self, index: Runs, burn_in: int) -> Runs:
+        """Number of the satellite in each slot, (k, S); -1 = none."""
+        return self.ranges.geometry.satellite[self._first(burn_in) + index]
+
+
+def _bare(dynamics: TightDynamics, prior: Floats) -> TightModel:
+    """The model as a navigator at the IMU rate takes it, which forms all covariances itself."""
+    nothing = np.empty((0, 0, 0))
+    return TightModel(dynamics, prior, nothing, nothing, nothing, nothing, nothing)
+
+
+def _distance(satellites: Floats, position: Floats) -> Floats:
+    """From satellites (k, S, 3) to receivers (k, 3), (k, S), m."""
+    return np.asarray(np.sqrt(np.square(satellites - geodetic_to_ecef(position)[:, None]).sum(axis=2)))

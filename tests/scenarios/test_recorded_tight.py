@@ -1,0 +1,212 @@
+"""Recorded ranges as a game on the tightly coupled filter: synthetic drives with known truth, and a phone's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import spoofgym  # noqa: F401
+from spoofgym.attacks import make_attack
+from spoofgym.detectors import make_detector
+from spoofgym.geodesy import position_difference
+from spoofgym.navigation.tight_states import CLOCK
+from spoofgym.scenarios import make_scenario
+from spoofgym.scenarios.log import interpolate, read_log
+from spoofgym.scenarios.ranges_log import read_ranges
+from spoofgym.scenarios.recorded import recorded
+from spoofgym.scenarios.recorded_tight import RecordedRanges
+from spoofgym.simulation import Simulation
+from tests.scenarios.range_drive import DELAY, write_drive
+from tests.scenarios.test_ranges_log import CLOCK as CLOCK_OFFSET
+from tests.scenarios.test_ranges_log import DRIFT, FIRST
+from tests.scenarios.test_recorded import write_log
+
+PHONE = Path(__file__).parents[3] / "shared" / "data" / "car-phone-raw"
+ONSET = FIRST + 60.0
+
+
+def tight(folder: Path, **options: object) -> RecordedRanges:
+    scenario = recorded(str(folder), coupling="tight", **options)
+    assert isinstance(scenario, RecordedRanges)
+    return scenario
+
+
+def play(scenario, attack=None, detectors=(), offset=None) -> tuple[Simulation, dict[str, np.ndarray]]:
+    """Errors and clock errors after each epoch, nis and degrees of freedom; ``offset`` (4,) is held."""
+    simulation = Simulation(scenario, attack, detectors, num_runs=2, seed=3, fidelity="strapdown")
+    simulation.reset()
+    simulation.resolve()
+    seen: dict[str, list] = {"error": [], "clock": [], "nis": [], "degrees": []}
+    for _ in range(scenario.timeline.num_epochs):
+        epoch = simulation.observe(None if offset is None else np.tile(offset, (2, 1)))
+        simulation.resolve()
+        seen["error"].append(simulation.error[0].copy())
+        seen["clock"].append(simulation.navigator.clock_error[0])
+        seen["nis"].append(epoch.innovation.nis[0])
+        seen["degrees"].append(epoch.innovation.degrees[0])
+        np.testing.assert_array_equal(simulation.error[0], simulation.error[1])  # one realisation
+    return simulation, {name: np.array(values) for name, values in seen.items()}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("drives") / "noisy"
+    write_drive(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def exact(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("drives") / "exact"
+    write_drive(folder, noise=0.0, turns=4)
+    return folder
+
+
+def test_exact_ranges_give_the_true_motion_and_clock(exact: Path) -> None:
+    """What is left are IMU noise and 3 ms of delay, found from the drive, at 12 m/s."""
+    scenario = tight(exact)
+    assert scenario.epochs.geometry.time[0] - scenario.epochs.time[0] == pytest.approx(DELAY, abs=0.02)
+    settled = scenario.epoch_time > FIRST + 30.0
+    error = position_difference(scenario.clean.position[1:], scenario.true_position)[settled]
+    assert np.abs(error).max() < 0.4
+    ranges = scenario.ranges
+    reference = ranges.clock[0] + ranges.clock_drift[0] * (ranges.time - ranges.time[0])
+    # the first epoch is one second after the start of the drive
+    truth = CLOCK_OFFSET + DRIFT * (ranges.geometry.time - FIRST - DELAY - 1.0)
+    np.testing.assert_allclose((reference + scenario.clean.state[1:, CLOCK] - truth)[settled], 0.0, atol=0.5)
+
+
+def test_white_noise_gives_the_innovations_that_the_filter_expects(folder: Path) -> None:
+    """The noise is the filter's own; it believes in slow errors that are not there, so that it is cautious."""
+    _, seen = play(tight(folder, onset=FIRST + 40.0))
+    assert seen["degrees"].sum() > 2000
+    # the mean of 2000 squares has a standard deviation of 0.032: 6 of them above 1
+    assert 0.6 < seen["nis"].sum() / seen["degrees"].sum() < 1.19
+    assert np.median(np.hypot(*seen["error"][:, :2].T)) < 2.0
+
+
+def test_a_pull_of_all_ranges_moves_the_position_and_leaves_no_residual_for_raim(folder: Path) -> None:
+    scenario = tight(folder, onset=ONSET)
+    attack = make_attack("ramp:0.5,direction=0")
+    simulation, pulled = play(scenario, attack, [make_detector("raim:p_fa=1e-9")])
+    _, clean = play(scenario)
+    moved = (pulled["error"] - clean["error"])[-1]
+    assert moved[1] == pytest.approx(0.5 * (scenario.timeline.end - scenario.timeline.start), abs=1.0)
+    assert np.abs(moved[[0, 2]]).max() < 1.0
+    assert not simulation.alarm.any()
+
+
+def test_a_pull_of_the_clock_moves_the_clock_alone(folder: Path) -> None:
+    scenario = tight(folder, onset=ONSET)
+    _, clean = play(scenario)
+    _, pulled = play(scenario, offset=np.array([0.0, 0.0, 0.0, 30.0]))
+    assert np.abs(clean["clock"]).max() < 0.05
+    assert (pulled["clock"] - clean["clock"])[-1] == pytest.approx(30.0, abs=0.5)
+    assert np.abs(pulled["error"] - clean["error"])[-20:].max() < 0.5
+
+
+def test_the_model_of_the_game_has_the_covariances_of_the_clean_run(folder: Path) -> None:
+    """The navigator forms its covariance run by run in its own code; the model by the recursion of the linear one."""
+    scenario = tight(folder, onset=ONSET, horizon=60)
+    model, first = scenario.tight_model(10), scenario.first - 10
+    for k in (0, 10, 70):
+        after = model.covariance[k] - model.whitened_gain[k].T @ model.whitened_gain[k]
+        navigated = scenario.clean.covariance[first + k + 1]
+        np.testing.assert_allclose(after, navigated, rtol=1e-6, atol=1e-9 * navigated.max())
+    with pytest.raises(ValueError, match="no linear model"):
+        scenario.linear_model()
+
+
+def test_without_a_reference_the_unspoofed_run_is_the_truth(tmp_path: Path) -> None:
+    write_drive(tmp_path / "log", reference=False, turns=4)
+    _, seen = play(tight(tmp_path / "log", onset=ONSET))
+    assert np.abs(seen["error"]).max() < 0.01
+
+
+def test_the_game_does_not_depend_on_where_its_model_starts(folder: Path) -> None:
+    scenario = tight(folder, onset=ONSET, horizon=30)
+    _, plain = play(scenario)
+    _, windowed = play(scenario, None, [make_detector("ci:n=20,p_fa=1e-12")])
+    np.testing.assert_allclose(windowed["error"], plain["error"], atol=1e-9)
+
+
+def test_silence_is_coasted_through_and_satellites_are_known_again(tmp_path: Path) -> None:
+    write_drive(tmp_path / "log", silent=(80, 95), turns=5)
+    scenario = tight(tmp_path / "log", onset=ONSET)
+    counted = scenario.ranges.geometry.present.sum(axis=1)
+    np.testing.assert_allclose(np.diff(scenario.epoch_time), 1.0, atol=1e-5)
+    silent = np.flatnonzero(counted == 0)
+    assert len(silent) == 15
+    assert (np.diff(silent) == 1).all()
+    assert not scenario.ranges.started[silent[-1] + 1 :].any()
+    sigma = np.sqrt(np.trace(scenario.clean.covariance[:, 6:9, 6:9], axis1=1, axis2=2))
+    assert sigma[silent[-1] + 1] > 1.5 * sigma[silent[0]]
+    _, seen = play(scenario)
+    assert (seen["degrees"] == 0).sum() == 15
+    assert (seen["nis"][seen["degrees"] == 0] == 0.0).all()
+    assert np.hypot(*seen["error"][-20:, :2].T).max() < 5.0
+
+
+def test_a_faulty_range_is_left_out(tmp_path: Path, folder: Path) -> None:
+    write_drive(tmp_path / "log", fault=2000.0)
+    whole, faulty = tight(folder), tight(tmp_path / "log")
+    lost = np.argwhere(whole.epochs.geometry.present & ~faulty.epochs.geometry.present)
+    assert lost[:, 0].tolist() == [60]
+    assert np.abs(position_difference(faulty.clean.position[70], whole.clean.position[70])).max() < 2.0
+
+
+def test_specification_detectors_and_environment(folder: Path) -> None:
+    name = f"recorded:{folder},onset={ONSET + 0.5},horizon=6,coupling=tight"
+    scenario = make_scenario(name)
+    assert scenario.name == name
+    assert make_scenario(f"recorded:{folder},onset={ONSET + 0.5},horizon=6", "tight").name == name
+    present = scenario.satellites(np.array([0, 3]), 0)
+    assert (present >= -1).all()
+    assert set(present[present > 0]) <= set(read_ranges(folder).ephemeris.satellites)
+    for text in ("snapshot", "cpi:n=20", "separation-bank:n=10"):
+        play(scenario, None, [make_detector(text)])
+    env = gymnasium.make("spoofgym/Spoofer-v0", scenario=name, fidelity="strapdown", knowledge="blind")
+    assert env.action_space.shape == (4,)
+    env.reset(seed=0)
+    for k in range(6):
+        _, _, terminated, truncated, _ = env.step(np.zeros(4, dtype=np.float32))
+        assert (terminated or truncated) == (k == 5)
+    env.close()
+
+
+def test_what_a_log_of_ranges_cannot_do(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="velocity, sigma_floor and fixes are of fixes; coupling=tight takes none"):
+        tight(folder, fixes="ranges")
+    with pytest.raises(ValueError, match="coupling must be one of loose, tight, got 'deep'"):
+        recorded(str(folder), coupling="deep")
+    with pytest.raises(ValueError, match="valid fidelities: strapdown"):
+        Simulation(tight(folder), fidelity="linear")
+    with pytest.raises(ValueError, match=r"has no ranges \(ranges.csv, ephemeris.csv\) for a filter to take"):
+        tight(write_log(tmp_path / "bare"))
+    write_drive(tmp_path / "log", turns=4)
+    lines = (tmp_path / "log" / "ranges.csv").read_text().splitlines()
+    moved = [line.split(",") for line in lines[1:]]
+    last = moved[-1][1]
+    rows = [",".join([row[0], f"{float(row[1]) + 0.4:.9f}" if row[1] == last else row[1], *row[2:]]) for row in moved]
+    (tmp_path / "log" / "ranges.csv").write_text("\n".join([lines[0], *rows]))
+    with pytest.raises(ValueError, match=r"must come at a steady rate: after .* the next come 1\.4 s later"):
+        tight(tmp_path / "log")
+
+
+@pytest.mark.skipif(not PHONE.is_dir(), reason="../shared/data, real logs for tests, is absent")
+def test_a_phone_in_a_city() -> None:
+    """The filter stays within metres of the phone's own fixes, which are made from the same signals."""
+    scenario = tight(PHONE)
+    assert scenario.slots <= 9
+    phone = read_log(PHONE).fixes
+    gap = np.flatnonzero(np.diff(phone.time) > 1.5)
+    inside = (scenario.epoch_time > phone.time[gap[0] + 1] + 30.0) & (scenario.epoch_time < phone.time[gap[1]])
+    place, _ = interpolate(phone, scenario.epoch_time[inside])
+    error = position_difference(scenario.clean.position[1:][inside], place)
+    assert np.median(np.hypot(error[:, 0], error[:, 1])) < 4.0
+    # the clock of the phone keeps its rate: pseudoranges and range rates tell the same
+    drift = np.diff(scenario.epochs.clock) / scenario.epochs.interval
+    assert np.median(drift) == pytest.approx(np.median(scenario.epochs.clock_drift), abs=1.0)
