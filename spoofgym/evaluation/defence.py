@@ -217,7 +217,7 @@ def play_policy(
     Args:
         world: what is played in.
         config: of the game that the policy was trained on: what it observes.
-        act: actions for observations (N, D), (N, 2).
+        act: actions for observations (N, D), (N, 2 + S).
         episodes: how many games; game i is seeded ``seed + i``.
         seed: of game 0.
     """

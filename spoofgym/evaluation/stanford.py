@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ NOMINAL, MISLEADING, HAZARDOUS, UNAVAILABLE = range(4)
 NAMES = ("nominal", "misleading", "hazardously misleading", "unavailable")
 COLOURS = ("#ffffff", "#fbe3c0", "#f3b8ae", "#e6e6e6")
 """Of the four regions, in the order of `NAMES`."""
+COLOUR_MAP = "viridis_r"
+"""Of the cells: epochs where there are few are bright, like the regions about them."""
 CELLS_TO_LIMIT = 40
 """Cells of the diagram from zero to the alert limit."""
 REACH = 1.5
@@ -119,26 +122,55 @@ def draw(diagram: StanfordDiagram, path: Path, title: str = "") -> None:
     Raises:
         ImportError: matplotlib is missing.
     """
+    draw_side_by_side({title: diagram}, path)
+
+
+def draw_side_by_side(diagrams: dict[str, StanfordDiagram], path: Path, heading: str = "") -> None:
+    """Write one picture of several diagrams, which share the colours of their cells.
+
+    Args:
+        diagrams: by their titles, from left to right.
+        path: of the file.
+        heading: above all.
+
+    Raises:
+        ImportError: matplotlib is missing.
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LogNorm
         from matplotlib.figure import Figure
-        from matplotlib.patches import Patch
     except ImportError as error:
         raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
-    figure = Figure(figsize=(7.2, 6.0), dpi=150, layout="constrained")
+    figure = Figure(figsize=(1.2 + 6.0 * len(diagrams), 6.0), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    most = max(2, max(int(diagram.counts.max()) for diagram in diagrams.values()))
+    norm = LogNorm(1, most)
+    panels = figure.subplots(1, len(diagrams), squeeze=False)[0]
+    for axes, (title, diagram) in zip(panels, diagrams.items(), strict=True):
+        _panel(axes, diagram, norm)
+        axes.set_title(title)
+    if heading:
+        figure.suptitle(heading)
+    figure.colorbar(ScalarMappable(norm, COLOUR_MAP), ax=list(panels), label="epochs", shrink=0.85, pad=0.02)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def _panel(axes: Any, diagram: StanfordDiagram, norm: Any) -> None:
+    """Draw one diagram on the axes of a figure."""
+    from matplotlib.patches import Patch
+
     limit, end = diagram.alert_limit, float(diagram.edges[-1])
     for corners, colour in zip(_corners(limit, end), COLOURS, strict=True):
         axes.fill(*corners.T, color=colour, linewidth=0.0, zorder=0)
-    most = max(int(diagram.counts.max()), 2)
-    cells = axes.pcolormesh(
+    axes.pcolormesh(
         diagram.edges,
         diagram.edges,
         np.ma.masked_equal(diagram.counts.T, 0),
-        norm=LogNorm(1, most),
-        cmap="viridis_r",  # epochs where there are few are bright, like the regions about them
+        norm=norm,
+        cmap=COLOUR_MAP,
         zorder=1,
     )
     axes.plot([0.0, end], [0.0, end], color="black", linewidth=0.8, zorder=2)
@@ -152,10 +184,6 @@ def draw(diagram: StanfordDiagram, path: Path, title: str = "") -> None:
     axes.set(xlim=(0.0, end), ylim=(0.0, end), aspect="equal")
     axes.set(xlabel="error, m (last column: and beyond)", ylabel="protection level, m (last row: and beyond)")
     axes.text(1.01 * end, limit, "alert\nlimit", fontsize=8, va="center")
-    axes.set_title(title)
-    figure.colorbar(cells, ax=axes, label="epochs", shrink=0.85)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
 
 
 def _corners(limit: float, end: float) -> list[NDArray[np.float64]]:

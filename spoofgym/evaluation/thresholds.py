@@ -61,6 +61,11 @@ def _line(row: dict[str, Any]) -> str:
     return f"{given}  ARL0 {reached}{interval}  ({row['from']})"
 
 
+def fitting(scenario: Scenario) -> list[str]:
+    """The detectors that ask for nothing but what the scenario offers, by their names."""
+    return [name for name in DETECTORS if set(make_detector(name).needs) <= set(scenario.offers)]
+
+
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = argparse.ArgumentParser(
@@ -69,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add = result.add_argument
     add("--scenario", default="liu-flight", help="in which they hold (default: %(default)s)")
-    add("--detector", action="append", help="repeatable (default: every family)")
+    add("--detector", action="append", help="repeatable (default: every family that fits the scenario)")
     add("--arl0", type=float, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
     add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
     return result
@@ -80,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
         scenario = make_scenario(options.scenario)
-        rows = threshold_rows(scenario, options.detector or list(DETECTORS), options.arl0)
+        rows = threshold_rows(scenario, options.detector or fitting(scenario), options.arl0)
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -4,6 +4,7 @@
     python -m spoofgym.evaluation.reproduce foi-r-5687 --json rows.json
     python -m spoofgym.evaluation.reproduce shadmehri-2025
     python -m spoofgym.evaluation.reproduce song-2021
+    python -m spoofgym.evaluation.reproduce kujur-2024
 
 The tables need `spoofgym[train]`.
 """
@@ -16,7 +17,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from spoofgym.evaluation.reproduce import foi_r_5687, liu_2018, shadmehri_2025, song_2021
+from spoofgym.evaluation.reproduce import foi_r_5687, kujur_2024, liu_2018, shadmehri_2025, song_2021
 
 try:
     from rich.console import Console
@@ -25,7 +26,7 @@ try:
 except ModuleNotFoundError as error:
     raise SystemExit("the tables need rich: pip install 'spoofgym[train]'") from error
 
-PAPERS = {module.PAPER: module.reproduce for module in (liu_2018, foi_r_5687, shadmehri_2025, song_2021)}
+PAPERS = {module.PAPER: module.reproduce for module in (liu_2018, foi_r_5687, shadmehri_2025, song_2021, kujur_2024)}
 RUNS, QUICK_RUNS = 40, 4
 
 
