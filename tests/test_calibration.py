@@ -13,6 +13,7 @@ from spoofgym.clean_statistics import white_statistics
 from spoofgym.detectors import Acna, Snapshot, Windowed, make_detector
 from spoofgym.first_alarms import FirstAlarms
 from spoofgym.navigation.facts import FilterFacts
+from spoofgym.navigation.white import WhiteInnovations
 
 UNLIKELY = 1e-7
 WHITE = white_statistics(np.eye(3), 200)
@@ -124,7 +125,7 @@ def scenario_of(factor, *, matched=True, num_epochs=120):
         dimension=len(factor),
         matched=matched,
         timeline=SimpleNamespace(num_epochs=num_epochs),
-        linear_model=lambda: SimpleNamespace(innovation_factor=factors),
+        white_innovations=lambda: WhiteInnovations(factors),
         facts=FilterFacts("stub", 1.0, np.ones(6), (), lambda burn_in: None),
     )
 
