@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector, seen, seen_dimension
-from spoofgym.navigation.facts import LINEAR_MODEL
+from spoofgym.navigation.facts import LINEAR_MODEL, RANGES
 from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
@@ -85,6 +85,7 @@ class Simulation:
             self._bind_attack(attack)
         self.response = response
         if response is not None:
+            scenario.facts.require(f"response {response.name!r}", response.needs)
             response.bind(num_runs)
         memory = max((detector.memory for detector in detectors), default=0)
         self._white_memory = memory if scenario.matched else 0
@@ -112,10 +113,13 @@ class Simulation:
 
     def _bind_attack(self, attack: Attack) -> None:
         if attack.needs_velocity and (self.scenario.dimension != 6 or self.scenario.coupling == "tight"):
+            tight = self.scenario.coupling == "tight"
+            given = "ranges" if tight else f"fixes of position alone (m = {self.scenario.dimension})"
             raise ValueError(
-                f"attack {attack.name!r} needs fixes with velocity (m = 6), scenario {self.scenario.name!r} has fixes "
-                f"of position alone (m = {self.scenario.dimension})"
+                f"attack {attack.name!r} needs fixes with velocity (m = 6), scenario {self.scenario.name!r} has {given}"
             )
+        if attack.needs_ranges:
+            self.scenario.facts.require(f"attack {attack.name!r}", (RANGES,))
         attack.bind(self.scenario.timeline, self.num_runs)
         attack.follow(self.scenario.velocity())
         if attack.needs_model:
@@ -136,6 +140,10 @@ class Simulation:
     def _blank_epoch(self) -> Epoch:
         n, m = self.num_runs, self.scenario.dimension
         innovation = Innovation(np.zeros((n, m)), np.zeros((n, m, m)), np.zeros((n, m)), np.zeros(n))
+        if self.scenario.coupling == "tight":
+            innovation = replace(
+                innovation, range_response=np.zeros((n, m, 3)), present=np.zeros((n, m), dtype=np.bool_)
+            )
         statistics = {name: np.zeros(n) for name in self.detectors}
         available = np.ones(n, dtype=bool)
         return Epoch(np.zeros(n, dtype=np.int64), np.zeros(n), innovation, statistics, available, self._view(self._all))
@@ -348,10 +356,13 @@ class Simulation:
                 part[~available] = 0.0
         return available
 
+    def _seen_by_response(self, epoch: Epoch) -> Epoch:
+        return epoch if self.response is None or not self.response.in_position else epoch.in_position
+
     def _decide(self) -> None:
         """The response sees each epoch once."""
         if self.response is not None:
-            self.decision = self.response.decide(self.epoch.in_position, self.alarm)
+            self.decision = self.response.decide(self._seen_by_response(self.epoch), self.alarm)
 
     def _decide_first(self, runs: Runs, epoch: Epoch) -> None:
         """A copy of the response, for these runs alone, sees their epoch 0; the others see each epoch once."""
@@ -359,5 +370,5 @@ class Simulation:
             part = copy.copy(self.response)
             part.bind(len(runs))
             part.reset(np.arange(len(runs)))
-            self.decision = self.decision.put(runs, part.decide(epoch.in_position, self.alarm[runs]))
+            self.decision = self.decision.put(runs, part.decide(self._seen_by_response(epoch), self.alarm[runs]))
             self.response.take(runs, part)

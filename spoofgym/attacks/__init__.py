@@ -21,22 +21,29 @@ from spoofgym.attacks.families import (
 from spoofgym.attacks.fusion_ripper import FusionRipper
 from spoofgym.attacks.meaconing import Meaconing
 from spoofgym.attacks.noise_matched import NoiseMatched
+from spoofgym.attacks.partial import Partial
 from spoofgym.attacks.pool import POPULATIONS, AttackPool
 from spoofgym.attacks.position_only import PositionOnly
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
+from spoofgym.attacks.range_attack import LiuSpoofer
 from spoofgym.attacks.song_mix import SongMix
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
 from spoofgym.specification import Specification, build, unnest
 
 
-def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0) -> TrackingError:
+def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> TrackingError:
     """The tracking error around an attack that is spelled with ``/`` in place of its commas."""
-    return TrackingError(make_attack(unnest(attack)), sigma, time)
+    return TrackingError(make_attack(unnest(attack)), sigma, time, axis)
 
 
 def _position_only(attack: str) -> PositionOnly:
     """The attack spelled with ``/`` in place of its commas, with a velocity that stays true."""
     return PositionOnly(make_attack(unnest(attack)))
+
+
+def _partial(attack: str, satellites: int | None = None, numbers: str | None = None) -> Partial:
+    """The attack spelled with ``/`` in place of its commas, on a part of the satellites."""
+    return Partial(make_attack(unnest(attack)), satellites, numbers)
 
 
 ATTACKS: dict[str, Callable[..., Attack]] = {
@@ -52,6 +59,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "fusion-ripper": FusionRipper,
     "noise-matched": NoiseMatched,
     "azimuth": Azimuth,
+    "liu-spoofer": LiuSpoofer,
     **FOI_ATTACKS,
     "random-ramp": RandomRamp,
     "random-jump": RandomJump,
@@ -63,6 +71,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     **POPULATIONS,
     "tracking-error": _tracking_error,
     "position-only": _position_only,
+    "partial": _partial,
 }
 
 

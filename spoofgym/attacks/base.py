@@ -22,11 +22,13 @@ class Attack(ABC):
             one).
         needs_model: whether it must `study` the victim's filter.
         needs_velocity: whether the receiver must give velocity, too.
+        needs_ranges: whether the filter must take ranges.
     """
 
     onset: float | None = None
     needs_model: bool = False
     needs_velocity: bool = False
+    needs_ranges: bool = False
 
     @property
     @abstractmethod

@@ -56,6 +56,7 @@ class AttackPool(Attack):
         self._members = [member for member, _ in members]
         self.needs_model = any(member.needs_model for member in self._members)
         self.needs_velocity = any(member.needs_velocity for member in self._members)
+        self.needs_ranges = any(member.needs_ranges for member in self._members)
         self.names = tuple(member.name for member in self._members)
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"each attack can be in a pool once only, got {', '.join(self.names)}")
@@ -120,6 +121,23 @@ class AttackPool(Attack):
             if attack.needs_velocity:
                 added = np.where((self.member == place)[:, None], attack.velocity(clock, rate), added)
         return added
+
+    def clock_offset(self, clock: Clock) -> Floats:
+        """How far each run's opponent pulls the receiver's clock away, (N,), m."""
+        moved = np.zeros(self._num_runs)
+        for place, attack in enumerate(self._members):
+            moved = np.where(self.member == place, attack.clock_offset(clock), moved)
+        return moved
+
+    def captured(self, clock: Clock, satellites: Runs) -> Flags | None:
+        """Which satellites each run's opponent captures, (N, S); None = all in every run."""
+        taken: Flags | None = None
+        for place, attack in enumerate(self._members):
+            part = attack.captured(clock, satellites)
+            if part is not None:
+                everything = np.ones(part.shape, dtype=bool) if taken is None else taken
+                taken = np.where((self.member == place)[:, None], part, everything)
+        return taken
 
 
 def training_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT_MANOEUVRE) -> AttackPool:

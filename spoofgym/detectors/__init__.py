@@ -12,17 +12,22 @@ from spoofgym.detectors.acna import Acna
 from spoofgym.detectors.aime import Aime
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.bias_range import BiasRange
-from spoofgym.detectors.chi_square import Snapshot, Windowed
+from spoofgym.detectors.chi_square import DEFAULT_P_FA, Snapshot, Windowed
+from spoofgym.detectors.cpi import DEFAULT_WINDOW as CUMULATED
+from spoofgym.detectors.cpi import Cpi
 from spoofgym.detectors.cusum import Cusum, SignedCusum
 from spoofgym.detectors.ensemble import Ensemble
 from spoofgym.detectors.ewma import Ewma, Mewma
 from spoofgym.detectors.gates import ArduPilotGate, Px4Gate
 from spoofgym.detectors.growing_window import GrowingWindow
+from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.mean_innovation import MeanInnovation
 from spoofgym.detectors.moving_average import FiniteMovingAverage
+from spoofgym.detectors.raim import Raim
 from spoofgym.detectors.ramp_bank import RampBank
 from spoofgym.detectors.relative_motion import RelativeMotion
 from spoofgym.detectors.rio import Rio
+from spoofgym.detectors.separation_bank import SeparationBank
 from spoofgym.detectors.signed_mean import SignedMean
 from spoofgym.detectors.solution_separation import SolutionSeparation
 from spoofgym.detectors.whiteness import Whiteness
@@ -59,6 +64,14 @@ def _member(text: str, arl0: float) -> Detector:
         ) from error
 
 
+def _cumulative_innovation(
+    n: int = CUMULATED, threshold: float | None = None, p_fa: float | None = None, arl0: float | None = None
+) -> Windowed:
+    """The cumulative innovation of Kujur 2024, eq 4: the windowed test at the paper's false-alarm probability."""
+    given = threshold is not None or arl0 is not None
+    return Windowed(n, threshold, p_fa if p_fa is not None or given else DEFAULT_P_FA, None, arl0)
+
+
 DETECTORS: dict[str, Callable[..., Detector]] = {
     "snapshot": Snapshot,
     "windowed": Windowed,
@@ -78,10 +91,15 @@ DETECTORS: dict[str, Callable[..., Detector]] = {
     "whiteness": Whiteness,
     "ramp-bank": RampBank,
     "solution-separation": SolutionSeparation,
+    "separation-bank": SeparationBank,
+    "kujur-monitor": KujurMonitor,
     "acceleration": Acceleration,
     "px4-gate": Px4Gate,
     "ardupilot-gate": ArduPilotGate,
     "rio": Rio,
+    "ci": _cumulative_innovation,
+    "cpi": Cpi,
+    "raim": Raim,
     "ensemble": _ensemble,
 }
 

@@ -13,6 +13,8 @@ from spoofgym.detectors.window_bank import window_lengths
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WINDOWS = "30+60+120"
+NOTHING = 1e12
+"""Variance of a range that is not there, m²; its own innovation is zero, and not correlated with the others."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -107,7 +109,7 @@ class Aime(ThresholdDetector):
         num_runs, num_windows, width = self._total.shape
         rows, columns = self._triangle
         newest = np.zeros((width + 1, num_runs))
-        newest[: len(rows)] = epoch.innovation.covariance[:, rows, columns].T
+        newest[: len(rows)] = _covariance(epoch)[:, rows, columns].T
         newest[len(rows) : -1] = epoch.innovation.residual.T
         sweep(newest)
         self._since += 1
@@ -121,6 +123,14 @@ class Aime(ThresholdDetector):
         tests = means[-1].reshape(num_windows, num_runs)
         known = self._since < np.array(self.windows)[:, None]
         return np.asarray(np.maximum.reduce(np.where(known, tests, 0.0), axis=0))
+
+
+def _covariance(epoch: Epoch) -> Floats:
+    """V, (N, m, m); a range that is not there knows next to nothing."""
+    covariance, present = epoch.innovation.covariance, epoch.innovation.present
+    if present is None or present.all():
+        return covariance
+    return np.asarray(covariance + NOTHING * ~present[:, :, None] * np.eye(present.shape[1]))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,10 +1,13 @@
 """Chi-square tests of the innovation: of one epoch, and summed over a window.
 
 Under a matched filter the normalised innovation squared of a fix of dimension m is chi-square with m degrees of
-freedom, and independent from epoch to epoch.
+freedom, and independent from epoch to epoch. Where ranges are measured m is what is there, and it changes as satellites
+rise and set: the statistic is then brought to the degrees of freedom of all slots (`at_all_degrees`).
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 from scipy import special
@@ -12,7 +15,7 @@ from scipy import special
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector
-from spoofgym.detectors.ring import Ring
+from spoofgym.detectors.ring import MovingSum, Ring
 from spoofgym.navigation.interface import Epoch
 from spoofgym.specification import spell
 
@@ -44,12 +47,59 @@ def exceedance(threshold: float, degrees: int) -> float:
     return float(special.gammaincc(degrees / 2.0, threshold / 2.0))
 
 
+@lru_cache(maxsize=64)
+def quantile_ratios(p_fa: float, most: int) -> Floats:
+    """T(most) / T(d) for d = 0..most degrees of freedom, (most + 1,), with T the quantile at ``p_fa``.
+
+    The first one, and all of them where there is no such quantile, are 1.
+    """
+    quantiles = 2.0 * special.gammainccinv(0.5 * np.arange(1, most + 1), p_fa)
+    ratios = np.ones(most + 1)
+    if np.all(np.isfinite(quantiles) & (quantiles > 0.0)):
+        ratios[1:] = quantiles[-1] / quantiles
+    ratios.setflags(write=False)
+    return ratios
+
+
+def at_all_degrees(statistic: Floats, degrees: Runs, p_fa: float, most: int) -> Floats:
+    """A sum of squares with varying degrees of freedom, brought to ``most`` of them: q T(most) / T(degrees).
+
+    It exceeds T(most) exactly where q exceeds its own quantile T(degrees), so that one threshold serves all epochs.
+
+    Args:
+        statistic: q, (N,), zero where there are no degrees of freedom.
+        degrees: of each, (N,), up to ``most``.
+        p_fa: the probability of exceedance at which the quantiles are taken.
+        most: all there can be.
+    """
+    return statistic * quantile_ratios(p_fa, most).take(degrees)
+
+
+def measured_degrees(epoch: Epoch) -> Runs:
+    """Degrees of freedom of the nis, (N,); 0 where there is no fix."""
+    degrees = epoch.innovation.degrees
+    return degrees if epoch.available is None else degrees * epoch.available
+
+
+def nominal_p_fa(target_arl0: float | None, threshold: float | None, degrees: int) -> float:
+    """The probability of exceedance that a threshold is for: 1 / ARL0 where one is asked for, else that of chi-square.
+
+    Raises:
+        ValueError: neither is given.
+    """
+    if target_arl0 is not None:
+        return 1.0 / target_arl0
+    if threshold is None:
+        raise ValueError("a test needs a threshold or an arl0")
+    return exceedance(threshold, degrees)
+
+
 class Snapshot(Detector):
     """Chi-square test of each epoch by itself: statistic nis, alarm above the threshold.
 
     With nothing given the threshold is the published 25.9 for m = 3 (preset ``shadmehri``), and the quantile at 1e-5
     for m = 6. The statistics of a matched filter are independent, so ARL0 = 1 / P_FA exactly, and ``arl0`` needs no
-    simulation there.
+    simulation there. Of ranges m is that of all slots; epochs with fewer are brought to it (`at_all_degrees`).
 
     Args:
         threshold: compared with nis, no unit.
@@ -93,10 +143,14 @@ class Snapshot(Detector):
             self.threshold = self._threshold(dimension)
             p_fa = exceedance(self.threshold, dimension)
             self.arl0 = self.target_arl0 or (1.0 / p_fa if p_fa > 0.0 else None)
+        self._dimension = dimension
+        self._nominal = nominal_p_fa(self.target_arl0, self.threshold, dimension)
 
     def update(self, epoch: Epoch) -> Floats:
         """The normalised innovation squared, (N,)."""
-        return epoch.innovation.nis
+        if epoch.innovation.present is None:
+            return epoch.innovation.nis
+        return at_all_degrees(epoch.innovation.nis, measured_degrees(epoch), self._nominal, self._dimension)
 
     def _threshold(self, dimension: int) -> float:
         if self._given is not None:
@@ -115,7 +169,9 @@ class Windowed(Detector):
 
     ``n`` counts terms. FOI-R-5687's k counts the epochs before the present one: its test (3) sums n = k + 1 terms, so
     that fixes of position give it 3 (k + 1) degrees of freedom, not the 3k that its text states. Until n epochs have
-    come the sum is over what there is; an epoch without a fix counts as zero.
+    come the sum is over what there is; an epoch without a fix counts as zero. Of ranges the degrees of freedom are the
+    measurements in the window, and the sum is brought to m n (`at_all_degrees`): with ``p_fa`` it is the cumulative
+    innovation (CI) of Kujur 2024, eq 4.
 
     Windows overlap, so ARL0 is not 1 / P_FA: it is calibrated. With nothing given it is 1e5. Thresholds in
     `WINDOWED_THRESHOLDS` are taken from there; for any other combination ``threshold`` is None until calibration sets
@@ -178,18 +234,26 @@ class Windowed(Detector):
             ValueError: a preset published for another dimension.
         """
         self._ring = Ring(num_runs, self.n)
+        self._degrees = MovingSum(num_runs, self.n)
         if not self.calibrated:
             self.threshold = self._threshold(dimension)
             self.arl0 = None if self.threshold is None else self.target_arl0
+        self._most = dimension * self.n
+        self._nominal = nominal_p_fa(self.target_arl0, self.threshold, self._most)
 
     def reset(self, runs: Runs) -> None:
         """Empty the windows of these runs."""
         self._ring.reset(runs)
+        self._degrees.reset(runs)
 
     def update(self, epoch: Epoch) -> Floats:
         """The sum over the window, (N,), added up anew at every epoch so that no rounding error accumulates."""
         self._ring.push(epoch.innovation.nis)
-        return np.add.reduce(self._ring.values, axis=1)
+        total = np.add.reduce(self._ring.values, axis=1)
+        if epoch.innovation.present is None:
+            return total
+        degrees = self._degrees.push(measured_degrees(epoch).astype(np.float64))
+        return at_all_degrees(total, degrees.astype(np.int64), self._nominal, self._most)
 
     def _threshold(self, dimension: int) -> float | None:
         if self._p_fa is not None:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.detectors.base import Detector, ThresholdDetector
-from spoofgym.navigation.facts import FilterFacts
+from spoofgym.detectors.base import Detector, ThresholdDetector, seen, seen_dimension
+from spoofgym.navigation.facts import RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.specification import nest
 
@@ -31,6 +31,7 @@ class Ensemble(ThresholdDetector):
     """
 
     kind = "ensemble"
+    _ranges = False
 
     def __init__(
         self, members: Sequence[Detector], threshold: float | None = None, arl0: float | None = None
@@ -51,12 +52,16 @@ class Ensemble(ThresholdDetector):
 
     def bind(self, num_runs: int, dimension: int) -> None:
         """Allocate the memories of the members, in copies of them."""
+        self._bound = num_runs, dimension
         self.members = [copy.copy(member) for member in self.members]
         for member in self.members:
-            member.bind(num_runs, dimension)
+            member.bind(num_runs, seen_dimension(member, dimension, self._ranges))
 
     def know(self, facts: FilterFacts) -> None:
-        """Tell every member."""
+        """Tell every member, and bind each to what it sees of ranges, if such are measured."""
+        if (RANGES in facts.offers) != self._ranges:
+            self._ranges = RANGES in facts.offers
+            self.bind(*self._bound)
         for member in self.members:
             member.know(facts)
 
@@ -80,5 +85,5 @@ class Ensemble(ThresholdDetector):
         for member in self.members:
             if member.threshold is None:
                 raise RuntimeError(f"detector {self.name!r}: member {member.name!r} has no threshold yet: calibrate it")
-            np.maximum(largest, member.update(epoch) / member.threshold, out=largest)
+            np.maximum(largest, member.update(seen(member, epoch)) / member.threshold, out=largest)
         return largest

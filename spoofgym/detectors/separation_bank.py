@@ -9,7 +9,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.separation_theory import protection_level, separation_threshold
 from spoofgym.navigation.coasting import coasting_tables
-from spoofgym.navigation.facts import RANGES, FilterFacts
+from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.navigation.separation import CoastingWindows
 from spoofgym.specification import spell
@@ -57,7 +57,7 @@ class SeparationBank(ThresholdDetector):
     """
 
     kind = "separation-bank"
-    needs = (RANGES,)
+    needs = (RANGES, INERTIAL_SOLUTION)
     demands = Demands(auxiliary=True)
 
     def __init__(
@@ -81,8 +81,15 @@ class SeparationBank(ThresholdDetector):
             self.threshold = 1.0
         else:
             self.target_arl0 = validation.above(self.kind, "arl0", arl0, 1.0)
-        options = {"n": n, "direction": direction, "p_fa": p_fa, "p_md": p_md, "split": split, "arl0": arl0}
-        self._name = spell(self.kind, **changed(type(self), options))
+        self._name = spell(
+            self.kind,
+            n=None if n == DEFAULT_WINDOW else self.n,
+            direction=None if direction == "up" else direction,
+            p_fa=p_fa,
+            p_md=None if p_md == DEFAULT_P_MD else p_md,
+            split=None if split else split,
+            arl0=arl0,
+        )
 
     def bind(self, num_runs: int, dimension: int) -> None:
         """Allocate the windows."""

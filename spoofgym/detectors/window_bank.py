@@ -7,7 +7,7 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import Detector, ThresholdDetector
-from spoofgym.detectors.chi_square import DEFAULT_P_FA, quantile
+from spoofgym.detectors.chi_square import DEFAULT_P_FA, at_all_degrees, measured_degrees, quantile
 from spoofgym.detectors.ring import MovingSum
 from spoofgym.navigation.interface import Epoch
 
@@ -48,8 +48,9 @@ class WindowBank(ThresholdDetector):
     So a matched filter's statistic exceeds 1 with a probability of at most the budget. It fixes the ratios of the
     bounds, and the threshold is one factor on all of them; it is calibrated, since windows overlap.
 
-    Epochs that have not come, and those without a fix, count as zero. Bank and split: Quartararo and Langel 2022
-    (NAVIGATION 69(1), navi.507); lengths and budget are ours.
+    Epochs that have not come, and those without a fix, count as zero. Of ranges the degrees of freedom are the
+    measurements in each window, and the sums are brought to m n_j (`at_all_degrees`). Bank and split: Quartararo and
+    Langel 2022 (NAVIGATION 69(1), navi.507); lengths and budget are ours.
 
     Args:
         lengths: epochs of the windows, increasing, with ``+`` between.
@@ -78,23 +79,32 @@ class WindowBank(ThresholdDetector):
     def bind(self, num_runs: int, dimension: int) -> None:
         """Allocate the windows, and set their bounds for fixes of ``dimension`` m."""
         self._sums = [MovingSum(num_runs, length) for length in self.lengths]
-        share = self.budget / len(self.lengths)
-        self._bounds = [quantile(share, dimension * length) for length in self.lengths]
+        self._degrees = [MovingSum(num_runs, length) for length in self.lengths]
+        self._share = self.budget / len(self.lengths)
+        self._most = [dimension * length for length in self.lengths]
+        self._bounds = [quantile(self._share, most) for most in self._most]
 
     def reset(self, runs: Runs) -> None:
         """Empty the windows of these runs."""
-        for window in self._sums:
+        for window in (*self._sums, *self._degrees):
             window.reset(runs)
 
     def take(self, runs: Runs, other: Detector) -> None:
         """Copy the windows of a copy of this bank."""
         assert isinstance(other, WindowBank)
-        for mine, theirs in zip(self._sums, other._sums, strict=True):
+        pairs = zip((*self._sums, *self._degrees), (*other._sums, *other._degrees), strict=True)
+        for mine, theirs in pairs:
             mine.take(runs, theirs)
 
     def update(self, epoch: Epoch) -> Floats:
         """The largest sum over its bound, (N,)."""
         largest = np.zeros(len(epoch.index))
-        for window, bound in zip(self._sums, self._bounds, strict=True):
-            np.maximum(largest, window.push(epoch.innovation.nis) / bound, out=largest)
+        measured = None if epoch.innovation.present is None else measured_degrees(epoch).astype(np.float64)
+        for place, (window, bound) in enumerate(zip(self._sums, self._bounds, strict=True)):
+            total = window.push(epoch.innovation.nis)
+            if measured is not None:
+                degrees = self._degrees[place].push(measured).astype(np.int64)
+                # without a measurement the sum is a rounding error
+                total = at_all_degrees(np.where(degrees > 0, total, 0.0), degrees, self._share, self._most[place])
+            np.maximum(largest, total / bound, out=largest)
         return largest

@@ -32,6 +32,7 @@ class CoastingWindows:
         self._departure = np.zeros((num_runs, NUM_STATES, num_windows))
         self._excess: Floats | None = None
         self._alarmed = np.zeros((num_runs, num_windows), dtype=bool)
+        self._known = np.full((num_runs, num_windows), -1)
         self._place = np.zeros(num_runs, dtype=np.int64)
         self._count = np.zeros(num_runs, dtype=np.int64)
 
@@ -39,10 +40,11 @@ class CoastingWindows:
         """Close all windows of these runs."""
         for part in (self.age, self._clean_age, self._total, self._place, self._count):
             part[runs] = 0
+        self._known[runs] = -1
 
     def take(self, runs: Runs, other: CoastingWindows) -> None:
         """Copy the windows of fewer runs; run j becomes ``runs[j]`` here."""
-        for name in ("age", "_clean_age", "_total", "_departure", "_alarmed", "_place", "_count"):
+        for name in ("age", "_clean_age", "_total", "_departure", "_alarmed", "_known", "_place", "_count"):
             getattr(self, name)[runs] = getattr(other, name)
         # None: no run is at epoch 0 yet, where they are made
         if other._excess is not None:
@@ -137,6 +139,7 @@ class CoastingWindows:
             self._departure,
             self._covariances(),
             self._alarmed,
+            self._known,
             self._place,
             self._count,
             self.age,
@@ -258,6 +261,7 @@ def _separate_own(
     departure: Floats,
     excess: Floats,
     alarmed: Flags,
+    known: Runs,
     place: Runs,
     count: Runs,
     age: Runs,
@@ -277,13 +281,15 @@ def _separate_own(
             for j in range(NUM_STATES):
                 present[i] -= inverse[k, i, j] * auxiliary[run, j]
         slot = _open(run, present, departure, alarmed, place, count, age, clean_age)
+        known[run, slot] = k - 1
         _bring_back(covariance[run], noise[k], inverse[k], work, beyond)
         for p in range(PACKED):
             excess[run, p, slot] = beyond[p]
         if k == n - 1:
             _fill_early(slot, count[run], early, excess[run])
         if backtracked[run] > 0:
-            _take_back(slot, count[run], backtracked[run], departure[run], excess[run], alarmed[run])
+            first = k - 1 - backtracked[run]
+            _take_back(slot, count[run], first, known[run], departure[run], excess[run], alarmed[run])
         largest = 0.0
         for a in range(len(directions)):
             moved, gained = 0.0, 0.0
@@ -343,18 +349,26 @@ def _fill_early(slot: int, count: int, early: Floats, excess: Floats) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _take_back(slot: int, count: int, depth: int, departure: Floats, excess: Floats, alarmed: Flags) -> None:
-    """The filter has coasted in the epochs taken back: their windows are as the one opened before them.
+def _take_back(
+    slot: int, count: int, first: int, known: Runs, departure: Floats, excess: Floats, alarmed: Flags
+) -> None:
+    """The filter has given back the ranges from row ``first`` up to the last but one: so do the windows that know some.
 
-    Where that one has closed they are as the newest, in ``slot``.
+    They are then as the youngest that knows none of them; where that one has closed they are as the newest, in
+    ``slot``. The last row that each knows is in ``known``, (n,).
     """
-    source = slot - depth - 1 if depth + 1 < count else slot
-    for age in range(1, min(depth, count - 1) + 1):
-        for i in range(NUM_STATES):
-            departure[i, slot - age] = departure[i, source]
-        for p in range(PACKED):
-            excess[p, slot - age] = excess[p, source]
-        alarmed[slot - age] = alarmed[source]
+    source = slot
+    for age in range(count - 1, 0, -1):
+        if known[slot - age] < first:
+            source = slot - age
+    for age in range(1, count):
+        if first <= known[slot - age] < known[slot]:
+            known[slot - age] = known[source]
+            alarmed[slot - age] = alarmed[source]
+            for i in range(NUM_STATES):
+                departure[i, slot - age] = departure[i, source]
+            for p in range(PACKED):
+                excess[p, slot - age] = excess[p, source]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

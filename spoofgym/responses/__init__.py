@@ -9,6 +9,7 @@ from spoofgym.responses.backtrack import ExcludeAndBacktrack
 from spoofgym.responses.base import Response
 from spoofgym.responses.constant_velocity import ConstantVelocityStart
 from spoofgym.responses.exclude import AlwaysUse, Exclude, Latch
+from spoofgym.responses.exclude_satellites import ExcludeSatellites
 from spoofgym.responses.onset_depth import OnsetDepth
 from spoofgym.responses.px4 import Px4Auto, Px4DeadReckoning
 from spoofgym.specification import build
@@ -17,6 +18,7 @@ RESPONSES: dict[str, Callable[..., Response]] = {
     "always-use": AlwaysUse,
     "exclude": Exclude,
     "latch": Latch,
+    "exclude-satellites": ExcludeSatellites,
     "exclude-and-backtrack": ExcludeAndBacktrack,
     "constant-velocity-start": ConstantVelocityStart,
     "onset-depth": OnsetDepth,

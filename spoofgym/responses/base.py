@@ -21,9 +21,13 @@ class Response(ABC):
     Attributes:
         demands: what it asks of the navigator: by default that a fix can be left out; a response that backtracks
             demands the history it needs.
+        needs: what the scenario must offer beside innovations, e.g. ranges to satellites.
+        in_position: it sees ranges turned into a position (`Innovation.in_position`); else the ranges themselves.
     """
 
     demands: Demands = Demands(excludes=True)
+    needs: tuple[str, ...] = ()
+    in_position: bool = True
 
     @property
     @abstractmethod

@@ -32,6 +32,8 @@ class Watching(Response):
         self._detector = detector
         self._threshold = found[0].threshold
         self.demands = response.demands
+        self.needs = response.needs
+        self.in_position = response.in_position
 
     @property
     def name(self) -> str:

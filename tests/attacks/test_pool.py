@@ -143,6 +143,8 @@ REQUIRED = {
     "fusion-ripper": ":1",
     "tracking-error": ":ramp:1/direction=0",
     "position-only": ":ramp:1/direction=0",
+    "liu-spoofer": ":1",
+    "partial": ":ramp:1/direction=0",
 }
 
 

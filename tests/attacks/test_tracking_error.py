@@ -49,6 +49,14 @@ def test_the_offset_need_not_grow_for_the_error_to_act():
     assert np.all(rough[0, 1:] != 0.0)
 
 
+@pytest.mark.parametrize(("axis", "place"), [("east", 0), ("north", 1), ("up", 2)])
+def test_on_one_axis_it_errs_as_it_would_beside_the_others(axis, place):
+    whole, _ = episodes("tracking-error:ramp:0,sigma=0.1,time=40", 4)
+    alone, _ = episodes(f"tracking-error:ramp:0,sigma=0.1,time=40,axis={axis}", 4)
+    np.testing.assert_array_equal(alone[:, :, place], whole[:, :, place])
+    assert not np.any(np.delete(alone, place, axis=2))
+
+
 def test_an_attack_that_ends_takes_its_error_with_it():
     rough, active = episodes("tracking-error:azimuth:5/onset=40/end=90/decay=20")
     np.testing.assert_array_equal(active[0], (TIMELINE.times > 40.0) & (TIMELINE.times <= 90.0))
@@ -148,6 +156,7 @@ def test_the_environment_refuses_a_negative_time():
         "tracking-error:none",
         "tracking-error:training:clean=0.1,time=20",
         "tracking-error:foi-3",
+        "tracking-error:none,sigma=0.1,time=40,axis=up",
     ],
 )
 def test_the_name_builds_the_same_attack(specification):
@@ -164,9 +173,13 @@ def test_the_onset_is_that_of_the_attack_inside():
     [
         ("tracking-error", "needs 'attack'"),
         ("tracking-error:drift", "unknown attack 'drift'"),
-        ("tracking-error:ramp:0.5,direction=3", "no option 'direction'; valid options: attack, sigma, time; .*'/'"),
+        (
+            "tracking-error:ramp:0.5,direction=3",
+            "no option 'direction'; valid options: attack, sigma, time, axis; .*'/'",
+        ),
         ("tracking-error:ramp:1,sigma=-1", "sigma must be a finite number, 0 or more, got -1.0"),
         ("tracking-error:ramp:1,time=inf", "time must be a finite number, 0 or more, got inf"),
+        ("tracking-error:ramp:1,axis=down", "axis must be one of east, north, up, got 'down'"),
         ("tracking-error:tracking-error:none", "attack must have no tracking error of its own"),
     ],
 )

@@ -1,0 +1,65 @@
+"""The base class of attacks around another one."""
+
+from __future__ import annotations
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.attacks.base import Attack
+from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.streams import RunStreams
+
+
+class AroundAttack(Attack):
+    """An attack that does what the one inside does, but for what a subclass changes.
+
+    Attributes:
+        attack: the attack inside.
+    """
+
+    def __init__(self, attack: Attack) -> None:
+        self.attack = attack
+        self.onset = attack.onset
+        self.needs_model = attack.needs_model
+        self.needs_velocity = attack.needs_velocity
+        self.needs_ranges = attack.needs_ranges
+
+    def bind(self, timeline: Timeline, num_runs: int) -> None:
+        """Fit the attack inside to a game.
+
+        Raises:
+            ValueError: the attack inside does not fit the game.
+        """
+        self.attack.bind(timeline, num_runs)
+        super().bind(timeline, num_runs)
+
+    def follow(self, velocity: Floats) -> None:
+        """Tell the attack inside the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        self.attack.follow(velocity)
+
+    def study(self, model: LinearModel) -> None:
+        """Show the attack inside the victim's linear model."""
+        self.attack.study(model)
+
+    def reset(self, runs: Runs, streams: RunStreams) -> None:
+        """Start new episodes of the attack inside."""
+        self.attack.reset(runs, streams)
+
+    def active(self, clock: Clock) -> Flags:
+        """Whether the receiver follows the spoofer, (N,)."""
+        return self.attack.active(clock)
+
+    def offset(self, clock: Clock) -> Floats:
+        """The offset of the attack inside, (N, 3), m ENU."""
+        return self.attack.offset(clock)
+
+    def velocity(self, clock: Clock, rate: Floats) -> Floats:
+        """What the attack inside adds to the velocity of the fix at the rate of the whole offset, (N, 3), m/s ENU."""
+        return self.attack.velocity(clock, rate)
+
+    def clock_offset(self, clock: Clock) -> Floats:
+        """How far the attack inside pulls the receiver's clock away, (N,), m."""
+        return self.attack.clock_offset(clock)
+
+    def captured(self, clock: Clock, satellites: Runs) -> Flags | None:
+        """Which satellites' signals the receiver takes from the spoofer inside, (N, S); None = all."""
+        return self.attack.captured(clock, satellites)

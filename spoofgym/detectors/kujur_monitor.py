@@ -1,0 +1,104 @@
+"""The two monitors of Kujur 2024 side by side: long attacks by their tracking error, short ones by separation."""
+
+from __future__ import annotations
+
+from spoofgym import validation
+from spoofgym.arrays import Floats, Runs
+from spoofgym.detectors import cpi_theory
+from spoofgym.detectors.cpi import AXES, UP, Cpi, unit_vector
+from spoofgym.detectors.ensemble import Ensemble
+from spoofgym.detectors.separation_bank import DEFAULT_P_FA, DEFAULT_P_MD, DEFAULT_WINDOW, SeparationBank
+from spoofgym.navigation.tight_model import TightModel
+from spoofgym.navigation.tracking_response import projected_response
+from spoofgym.specification import spell
+
+DEFAULT_P_MD_CPI = 1e-7
+
+
+class KujurMonitor(Ensemble):
+    """Alarm where the cumulative innovation or the bank of separations alarms, both over n epochs (section 5).
+
+    An attack that has lasted for n epochs is seen by its tracking error (`Cpi`), for which n is chosen large enough
+    (`minimum_epochs`). A shorter one began within the windows of the bank (`SeparationBank`), whose coasting it has not
+    touched: it is seen, or the error is within the protection level. The statistic is the larger of both over its
+    threshold, against 1. Each monitor has half of P_FA; the equal split is ours.
+
+    Args:
+        n: epochs: terms of the cumulative innovation, and length and number of the windows of separation.
+        direction: ``up``, ``east`` or ``north``.
+        p_fa: probability of a false alarm at an epoch, of both together.
+        p_md_cpi: required probability of not seeing an attack that has lasted for n epochs.
+        p_md_ss: probability that the error is beyond the protection level without an alarm, to one side.
+
+    Raises:
+        ValueError: a value is out of range.
+    """
+
+    kind = "kujur-monitor"
+
+    def __init__(
+        self,
+        n: int = DEFAULT_WINDOW,
+        direction: str = UP,
+        p_fa: float = DEFAULT_P_FA,
+        p_md_cpi: float = DEFAULT_P_MD_CPI,
+        p_md_ss: float = DEFAULT_P_MD,
+    ) -> None:
+        self.n = validation.whole(self.kind, "n", n, 1)
+        self.direction = validation.one_of(self.kind, "direction", direction, tuple(AXES))
+        self.p_fa = validation.probability(self.kind, "p_fa", p_fa) / 2.0
+        self.p_md_cpi = validation.probability(self.kind, "p_md_cpi", p_md_cpi)
+        validation.probability(self.kind, "p_md_ss", p_md_ss)
+        cumulative = Cpi(self.n, self.direction, p_fa=self.p_fa)
+        super().__init__([cumulative, SeparationBank(self.n, self.direction, self.p_fa, p_md_ss)], threshold=1.0)
+        self._name = spell(
+            self.kind,
+            n=None if n == DEFAULT_WINDOW else self.n,
+            direction=None if direction == UP else direction,
+            p_fa=None if p_fa == DEFAULT_P_FA else p_fa,
+            p_md_cpi=None if p_md_cpi == DEFAULT_P_MD_CPI else p_md_cpi,
+            p_md_ss=None if p_md_ss == DEFAULT_P_MD else p_md_ss,
+        )
+
+    @property
+    def bank(self) -> SeparationBank:
+        """The monitor by separation."""
+        bank = self.members[1]
+        assert isinstance(bank, SeparationBank)
+        return bank
+
+    @property
+    def protection_level(self) -> Floats:
+        """PL after the present epoch, (N,), m."""
+        return self.bank.protection_level
+
+    @property
+    def coasting_sigma(self) -> Floats:
+        """σ_coast of the oldest window, (N,), m."""
+        return self.bank.coasting_sigma
+
+    @property
+    def recovery_depth(self) -> Runs:
+        """As `SeparationBank.recovery_depth`; the cumulative innovation does not count there, (N,)."""
+        return self.bank.recovery_depth
+
+    def minimum_epochs(self, model: TightModel, sigma: float, time: float) -> int | None:
+        """The shortest n whose cumulative innovation has the required P_MD, epochs; None where the model has too few.
+
+        With the exact response of the filter to the tracking error; the paper leaves its feedback out.
+
+        Args:
+            model: the filter; the spoofing begins at its epoch 1.
+            sigma: σ_t of the tracking error along the direction, m.
+            time: τ, its correlation time, s; 0 = white.
+
+        Raises:
+            ValueError: a value is out of range.
+        """
+        response = projected_response(model, unit_vector(self.kind, self.direction))
+        tracking = cpi_theory.gauss_markov_covariance(model.num_epochs, sigma, time, model.dynamics.interval)
+        return cpi_theory.minimum_epochs(
+            self.p_md_cpi,
+            lambda n: cpi_theory.missed_detection(self.p_fa, response[:n, :n], tracking[:n, :n]),
+            model.num_epochs,
+        )
