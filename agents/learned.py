@@ -13,6 +13,7 @@ from typing_extensions import Self
 
 from spoofgym.envs.config import DefenderConfig, SpooferConfig, configure
 from spoofgym.envs.observation import Field
+from spoofgym.envs.range_features import SLOT_FIELD
 
 POLICY_FILE = "policy.npz"
 CONFIG_FILE = "config.json"
@@ -109,16 +110,31 @@ class LearnedSpoofer(LearnedPolicy):
         return replace(self, config=replace(self.config, shadow=shadow))
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Actions in [-1, 1] for observations (N, D), (N, 3)."""
+        """Actions in [-1, 1] for observations (N, D), (N, 3), or (N, 4) where the filter takes ranges."""
         return np.clip(self.outputs(observation), -1.0, 1.0)
 
 
 class LearnedDefender(LearnedPolicy):
-    """A defender that plays the likeliest action: two outputs of its network are of use and exclude, D of the depth."""
+    """A defender that plays the likeliest action.
+
+    Two outputs of its network are of use and exclude, D of the depth and, where the filter takes ranges, two of each
+    slot.
+    """
 
     config_type = DefenderConfig
 
+    @property
+    def slots(self) -> int:
+        """S, slots of satellites that it was trained on; 0 where the filter takes fixes."""
+        return sum(name.startswith(SLOT_FIELD) for name in self.layout)
+
+    @property
+    def depths(self) -> int:
+        """D, entries of the depth table that it was trained on."""
+        return len(self.biases[-1]) - 2 - 2 * self.slots
+
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Actions for observations (N, D), (N, 2)."""
-        outputs = self.outputs(observation)
-        return np.stack([outputs[:, :2].argmax(axis=1), outputs[:, 2:].argmax(axis=1)], axis=1)
+        """Actions for observations (N, D), (N, 2 + S)."""
+        ends = np.cumsum([2, self.depths, *[2] * self.slots])[:-1]
+        parts = np.split(self.outputs(observation), ends, axis=1)
+        return np.stack([part.argmax(axis=1) for part in parts], axis=1)

@@ -25,6 +25,7 @@ from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
+SCENARIO = "liu-flight"
 RUNS = 1024
 ROUNDS = 5
 BY_THEMSELVES = ("solution-separation", "ramp-bank")
@@ -33,7 +34,7 @@ UNION = "ensemble"
 
 def measure(names: list[str]) -> list[dict[str, Any]]:
     """Microseconds of each detector's update and of the filter's step, medians over the epochs of several games."""
-    scenario = make_scenario("liu-flight")
+    scenario = make_scenario(SCENARIO)
     detectors = [make_detector(name) for name in names]
     demands = Demands(excludes=True)
     for detector in detectors:
@@ -83,7 +84,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.detectors", description=main.__doc__)
     parser.add_argument("--json", metavar="FILE", help="write JSON; - = to stdout, and nothing else there")
     options = parser.parse_args()
-    rows = measure([name for name in DETECTORS if name != UNION])
+    offers = set(make_scenario(SCENARIO).offers)
+    rows = measure([name for name in DETECTORS if name != UNION and set(make_detector(name).needs) <= offers])
     for row in rows:
         print(
             f"{row['what']:<24}{row['microseconds']:>9.0f} µs{row['filter_steps']:>8.3f} filter steps",

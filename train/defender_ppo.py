@@ -25,6 +25,7 @@ from torch import nn
 from agents.learned import LearnedDefender
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import EXCLUDE
+from spoofgym.envs.range_features import SLOT_FIELD
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
 from train.imitation import imitate
@@ -125,13 +126,25 @@ def _tanh_network(inputs: int, hidden: int) -> nn.Sequential:
 class DefenderPolicy(ActorCriticPolicy):
     """An actor that sees the first ``width`` entries of the observation, and a critic that sees all.
 
-    The depth of a backtrack counts only where the action begins an exclusion, as in the environment: elsewhere it has
-    no probability and no entropy, so that no gradient rewards or blames it.
+    The depth of a backtrack counts only where the action begins an exclusion, and the choice of a satellite only where
+    it is in view and the epoch is used, as in the environment: elsewhere they have no probability and no entropy, so
+    that no gradient rewards or blames them.
     """
 
-    def __init__(self, *args: Any, width: int, hidden: int, excluding: int, **kwargs: Any) -> None:
-        """Let the actor see ``width`` entries, of which number ``excluding`` tells whether GNSS is left out already."""
-        self._width, self._hidden, self._excluding = width, hidden, excluding
+    def __init__(
+        self, *args: Any, width: int, hidden: int, excluding: int, slots: tuple[int, ...], **kwargs: Any
+    ) -> None:
+        """Let the actor see ``width`` entries.
+
+        Args:
+            width: of what the actor sees.
+            hidden: width of the hidden layers.
+            excluding: the entry that tells whether GNSS is left out already.
+            slots: the entries that tell whether a slot holds a satellite, of every slot.
+            args: of SB3's policy.
+            kwargs: of SB3's policy.
+        """
+        self._width, self._hidden, self._excluding, self._slots = width, hidden, excluding, slots
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
@@ -158,10 +171,16 @@ class DefenderPolicy(ActorCriticPolicy):
     def _judge(
         self, distribution: Any, obs: torch.Tensor, actions: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        decision, depth = distribution.distribution
-        begins = (actions[:, 0] == EXCLUDE) & (obs[:, self._excluding] < 0.5)
+        decision, depth, *satellites = distribution.distribution
+        excludes = actions[:, 0] == EXCLUDE
+        begins = excludes & (obs[:, self._excluding] < 0.5)
         log_probability = decision.log_prob(actions[:, 0]) + begins * depth.log_prob(actions[:, 1])
-        return log_probability, decision.entropy() + begins * depth.entropy()
+        entropy = decision.entropy() + begins * depth.entropy()
+        for place, (slot, satellite) in enumerate(zip(self._slots, satellites, strict=True), start=2):
+            read = ~excludes & (obs[:, slot] > 0.5)
+            log_probability = log_probability + read * satellite.log_prob(actions[:, place])
+            entropy = entropy + read * satellite.entropy()
+        return log_probability, entropy
 
 
 class ScaledRewards(VecEnvWrapper):
@@ -199,7 +218,12 @@ def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: 
         gae_lambda=settings.gae_lambda,
         clip_range=settings.clip_range,
         ent_coef=settings.entropy,
-        policy_kwargs={"width": len(layout), "hidden": settings.hidden, "excluding": layout.index(EXCLUDING_FIELD)},
+        policy_kwargs={
+            "width": len(layout),
+            "hidden": settings.hidden,
+            "excluding": layout.index(EXCLUDING_FIELD),
+            "slots": tuple(place for place, name in enumerate(layout) if name.startswith(SLOT_FIELD)),
+        },
         tensorboard_log=str(folder / "tensorboard"),
         seed=seed,
         device="cpu",

@@ -85,9 +85,10 @@ def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
         config = replace(policy.config, scenario=world.scenario, fidelity=world.fidelity)
         game = DefenderGame(config, 1, world.detectors)
         policy.check_layout(game.fields)
-        actions, outputs = 2 + len(game.depths), len(policy.biases[-1])
-        if outputs != actions:
-            raise ValueError(f"policy {policy.name!r} was trained on {outputs - 2} depths, the game has {actions - 2}")
+        if policy.depths != len(game.depths):
+            raise ValueError(
+                f"policy {policy.name!r} was trained on {policy.depths} depths, the game has {len(game.depths)}"
+            )
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,10 @@ from spoofgym.scenarios import make_scenario
 def alarm_probability_is_known(config: SpooferConfig) -> bool:
     """Whether the snapshot test is alone, its filter matched, and shadowed by the spoofer without tracking error.
 
-    A shadow filter of another scenario's model (``config.shadow``) does not tell the victim's mean innovations.
+    A shadow filter of another scenario's model (``config.shadow``) does not tell the victim's mean innovations, and one
+    on ranges shows only their part in the position.
     """
+    scenario = make_scenario(config.scenario, config.coupling)
     detector = config.detector
     return (
         isinstance(detector, str)
@@ -42,7 +44,8 @@ def alarm_probability_is_known(config: SpooferConfig) -> bool:
         and config.on_alarm == "end"
         and config.forfeit == 1.0
         and config.tracking_sigma == 0.0
-        and make_scenario(config.scenario).matched
+        and scenario.matched
+        and scenario.coupling == "loose"
     )
 
 

@@ -46,7 +46,7 @@ class Teacher:
     reuse: int
 
     def act(self, game: DefenderGame) -> NDArray[np.int64]:
-        """What it does in the present epoch, (N, 2)."""
+        """What it does in the present epoch, (N, 2 + S); it leaves no single satellite out."""
         features = game.features
         if self.depth is None:
             place = np.searchsorted(game.depths, features.onset_depth + DEFAULT_MARGIN)
@@ -54,7 +54,9 @@ class Teacher:
         else:
             place = np.full(game.num_lanes, self.depth)
         exclude = features.suspicion | (game.excluding & (features.agreeing < self.reuse))
-        return np.stack([exclude.astype(np.int64), place], axis=1)
+        action = np.zeros((game.num_lanes, len(game.action_space.nvec)), dtype=np.int64)
+        action[:, 0], action[:, 1] = exclude, place
+        return action
 
 
 def best_teacher(vector: DefenderVectorEnv, seed: int) -> Teacher:
@@ -77,7 +79,7 @@ def total_error(vector: DefenderVectorEnv, teacher: Teacher, games: int, seed: i
 def examples(
     vector: DefenderVectorEnv, teacher: Teacher, seed: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Observations (n, D) of games that a teacher plays, and its actions (n, 2)."""
+    """Observations (n, D) of games that a teacher plays, and its actions (n, 2 + S)."""
     rng = np.random.default_rng(seed)
     observation, _ = vector.reset(seed=seed)
     observations, actions = [], []
@@ -104,12 +106,12 @@ def imitate(learner: PPO, vector: DefenderVectorEnv, seed: int) -> float:
     inputs, labels = torch.as_tensor(observations), torch.as_tensor(actions)
     extractor, head = learner.policy.mlp_extractor, learner.policy.action_net
     optimizer = torch.optim.Adam([*extractor.policy_net.parameters(), *head.parameters()], lr=LEARNING_RATE)
-    generator = torch.Generator().manual_seed(seed)
+    generator, sizes = torch.Generator().manual_seed(seed), vector.game.action_space.nvec.tolist()
     for _ in range(PASSES):
         for batch in torch.randperm(len(inputs), generator=generator).split(MINIBATCH):
             logits = head(extractor.policy_net(inputs[batch]))
-            loss = functional.cross_entropy(logits[:, :2], labels[batch, 0])
-            loss = loss + functional.cross_entropy(logits[:, 2:], labels[batch, 1])
+            parts = zip(logits.split(sizes, dim=1), labels[batch].T, strict=True)
+            loss = torch.stack([functional.cross_entropy(part, label) for part, label in parts]).sum()
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()

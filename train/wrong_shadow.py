@@ -87,7 +87,10 @@ def wrong_shadows(scenario: Scenario) -> list[Shadow]:
         ValueError: a scenario that is not simulated, or has no option ``imu`` or ``sigma``.
     """
     if not isinstance(scenario, SimulatedScenario):
-        raise ValueError(f"scenario {scenario.name!r} has no linear model, so that no spoofer can shadow its filter")
+        raise ValueError(
+            f"scenario {scenario.name!r} is none with simulated fixes (coupling=loose), on whose filter the optimum is "
+            "known"
+        )
     sigma = scenario.tuning.measurement_sigma[0]
     grades = [Shadow(f"imu {name}", _with(scenario, imu=name)) for name in GRADES if name != scenario.grade.name]
     factors = [Shadow(f"sigma x {factor:g}", _with(scenario, sigma=factor * sigma)) for factor in SIGMA_FACTORS]

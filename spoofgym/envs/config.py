@@ -10,6 +10,7 @@ from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios import COUPLINGS
 
 KNOWLEDGE = ("blind", "shadow", "full")
 ACTIONS = ("rate", "innovation")
@@ -43,6 +44,11 @@ def require(name: str, value: str, valid: tuple[str, ...]) -> None:
         raise ValueError(f"unknown {name} {value!r}; valid values: {', '.join(valid)}")
 
 
+def _require_coupling(coupling: str | None) -> None:
+    if coupling is not None:
+        require("coupling", coupling, COUPLINGS)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SpooferConfig:
     """Arguments of Spoofer-v0; the environment's page says what each means.
@@ -63,9 +69,11 @@ class SpooferConfig:
     tracking_time: float = 0.0
     frames: int = 1
     shadow: str | Scenario | None = None
+    coupling: str | None = None
     threads: int = 1
 
     def __post_init__(self) -> None:
+        _require_coupling(self.coupling)
         require("knowledge", self.knowledge, KNOWLEDGE)
         require("action", self.action, ACTIONS)
         require("on_alarm", self.on_alarm, ON_ALARM)
@@ -105,9 +113,11 @@ class DefenderConfig:
     error_scale: float | None = None
     error_clip: float = 5.0
     exclusion_cost: float = 0.05
+    coupling: str | None = None
     threads: int = 1
 
     def __post_init__(self) -> None:
+        _require_coupling(self.coupling)
         for name in ("clean", "outage", "multipath"):
             validation.share("Defender-v0", name, getattr(self, name))
         if self.error_scale is not None and not 0.0 < self.error_scale < float("inf"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from spoofgym.arrays import Flags
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_rendering import DefenderFigure
@@ -32,6 +33,10 @@ class DefenderEnv(SingleEnv):
     does. `relative-motion`, one of the default detectors, needs an inertial solution, which the robot has not: name
     others.
 
+    With `coupling="tight"` (`kujur-flight`, which is tight by itself, and `liu-flight`) the filter takes the ranges to
+    the satellites instead of fixes, and the defender may leave out single satellites. With fewer than four the filter
+    still uses what is left, and coasts in the directions that nothing observes.
+
     ```python
     import gymnasium
 
@@ -48,6 +53,21 @@ class DefenderEnv(SingleEnv):
       to use and this one is to exclude, and it is the number of epochs before the present one whose fixes are taken
       back. A backtrack no deeper than the present coast does nothing, for there is no fix to take back; one deeper than
       the history is cut. Both are told in `info`.
+
+    With `coupling="tight"` it is `MultiDiscrete([2, D] + [2] * S)`, S being the satellites that are tracked at most
+    (`env.unwrapped.game.scenario.slots`, eight on the Kujur flight):
+
+    | Place | Values |
+    |---|---|
+    | first | 0 = use the ranges of the present epoch, 1 = exclude them all |
+    | second | place in the depth table, as above |
+    | each slot | 0 = use the range and the carrier (or range rate) of its satellite, 1 = leave them out |
+
+    A choice to leave out what an empty slot does not hold does nothing, and `info` counts it; in an outage all slots
+    are empty. To leave out every satellite in view is to exclude the epoch. Choices of satellites hold for the present
+    epoch; ranges that were used before are taken back by a backtrack alone. `env.unwrapped.action_masks()`, and that of
+    the vector environment, tells which values are open, part after part, as MaskablePPO of sb3-contrib expects: all
+    are, but to leave out an empty slot.
 
     ## Observation Space
 
@@ -101,6 +121,27 @@ class DefenderEnv(SingleEnv):
       what is measured in metres is the scenario's `defender_scale`.
     - In an outage the innovations are zero, and nothing but the last decision tells a coast by choice.
 
+    With `coupling="tight"` the innovations of the table are those of the ranges turned into a position
+    (`Innovation.in_position`), and these entries follow the elapsed fraction:
+
+    | Name | Unit | Scale |
+    |---|---|---|
+    | code residual of slot 0, ..., S - 1 | sigma | 2 |
+    | satellite in slot 0, ..., S - 1 | 1 | not squashed |
+    | satellites in view | 1 | 8 |
+    | protection level horizontal over its alert limit | 1 | 1 |
+    | protection level vertical over its alert limit | 1 | 1 |
+    | protection level of NAME over its alert limit, for each detector that has one | 1 | 1 |
+
+    - Code residual: predicted minus measured range of the code, over the sigma that the filter expects of it, before
+      any range of the epoch is used: standard normal under a matched filter. Nothing is fitted to the others first, so
+      that a spoofed position shows in all slots and a single false satellite in its own. 0 in an empty slot.
+    - Protection levels horizontal and vertical are 6.0 and 5.33 sigma (K of RTCA DO-229 for approaches with vertical
+      guidance) of the filter's own covariance; horizontally that of the worst direction. They are blind to spoofing,
+      because the covariance does not depend on what the ranges say (Liu 2018, section 4). Those of a detector such as
+      `separation-bank`, which compares the filter with coasting solutions, are not.
+    - Alert limits are the scenario's `alert_limits` (556 m horizontally and 50 m vertically on the Kujur flight).
+
     `env.unwrapped.game.fields` gives the list of an environment.
 
     ## Rewards
@@ -111,7 +152,8 @@ class DefenderEnv(SingleEnv):
 
     - `error`: minus the error over `error_scale`, at most `error_clip`.
     - `exclusion`: minus `exclusion_cost` where the decision was to exclude a clean fix: one that the receiver gives,
-      not spoofed and without multipath.
+      not spoofed and without multipath. Where single satellites of a clean fix are left out, this times their share of
+      those in view.
 
     `info["error"]` and `info["mean_error"]` are not clipped: report those.
 
@@ -137,6 +179,9 @@ class DefenderEnv(SingleEnv):
     - `backtrack`: epochs whose fixes were taken back: less than asked where the history is shorter, 0 where the coast
       was as long.
     - `reward_terms`: `error` and `exclusion`.
+    - `satellites_left_out`: satellites in view that were left out of the last fix, if it was used (`coupling="tight"`
+      only).
+    - `satellites_ignored`: choices to leave out an empty slot (`coupling="tight"` only).
     - `mean_error`: mean of the error over the game, m (last step only).
 
     For training only: `env.unwrapped.game.privileged()` gives what a critic may know and no defender (the true error
@@ -156,6 +201,7 @@ class DefenderEnv(SingleEnv):
     | `error_scale` | `None` | metres of error that cost 1; None = the scenario's (10 m drive, 50 m flight, 1 m robot) |
     | `error_clip` | `5.0` | largest cost of the error in a step |
     | `exclusion_cost` | `0.05` | of a clean fix left out |
+    | `coupling` | `None` | "loose" (the filter takes fixes) or "tight" (ranges); None: what the scenario is |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
@@ -176,3 +222,8 @@ class DefenderEnv(SingleEnv):
         self.config = configure(DefenderConfig, arguments)
         game = DefenderGame(self.config, 1)
         super().__init__(game, render_mode, DefenderFigure(game) if render_mode == "rgb_array" else None)
+
+    def action_masks(self) -> Flags:
+        """Which values of the action are open, (M,), as MaskablePPO of sb3-contrib expects."""
+        masks: Flags = self.game.action_masks()[0]
+        return masks

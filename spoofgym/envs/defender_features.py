@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.envs.observation import AXES, Field, Squash
+from spoofgym.envs.range_features import RangeFeatures
 from spoofgym.responses.onset import OnsetEstimator
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -23,13 +24,11 @@ QUIET_EPOCHS = 5
 """Quiet fixes in a row after which a suspicion is dropped."""
 
 
-def defender_fields(
-    dimension: int, detectors: tuple[str, ...], error_scale: float
-) -> tuple[Field, ...]:
+def defender_fields(dimension: int, detectors: tuple[str, ...], error_scale: float) -> tuple[Field, ...]:
     """The entries of the defender's observation, in order.
 
     Args:
-        dimension: m, of the fix.
+        dimension: m, of the fix; 3 where ranges are turned into a position.
         detectors: their names.
         error_scale: metres of error that make a reward of -1.
     """
@@ -74,7 +73,13 @@ class DefenderFeatures:
     ) -> None:
         """Allocate the memory of ``num_lanes`` lanes, which see the ``detectors`` of these names."""
         self._simulation = simulation
-        self.fields = defender_fields(scenario.dimension, tuple(detectors), scenario.defender_scale)
+        ranges = scenario.coupling == "tight"
+        dimension = 3 if ranges else scenario.dimension
+        self.fields = defender_fields(dimension, tuple(detectors), scenario.defender_scale)
+        self._common = len(self.fields)
+        self._ranges = RangeFeatures(scenario, simulation, detectors) if ranges else None
+        if self._ranges is not None:
+            self.fields += self._ranges.fields
         self._detectors = tuple(detectors)
         self._thresholds = np.array([simulation.detectors[name].threshold for name in detectors])
         self._onset = OnsetEstimator(num_lanes)
@@ -87,7 +92,7 @@ class DefenderFeatures:
         self._quiet = np.zeros(num_lanes, dtype=np.int64)
         self.agreeing = np.zeros(num_lanes, dtype=np.int64)
         self._raw = np.zeros((num_lanes, len(self.fields)))
-        self._quiet_nis, self._quiet_mean = quantile(QUIET_P, scenario.dimension), quantile(QUIET_P, 2)
+        self._quiet_nis, self._quiet_mean = quantile(QUIET_P, dimension), quantile(QUIET_P, 2)
         self._interval, self._horizon = scenario.timeline.interval, scenario.timeline.num_epochs
         self._bias_sigma = scenario.bias_sigma
         self._squash = Squash(self.fields)
@@ -107,7 +112,7 @@ class DefenderFeatures:
             coast: epochs since a fix was last used, (N,).
             lanes: which.
         """
-        epoch = self._simulation.epoch
+        epoch = self._simulation.epoch.in_position
         assert epoch.available is not None
         assert epoch.view is not None
         self._onset.push(epoch.innovation.whitened[:, :2], lanes)
@@ -145,6 +150,8 @@ class DefenderFeatures:
             self.agreeing,
             self._raw,
         )
+        if self._ranges is not None:
+            self._raw[lanes, self._common :] = self._ranges()[lanes]
 
     def observation(self) -> NDArray[np.float32]:
         """What each lane's defender sees, (N, D)."""

@@ -20,6 +20,7 @@ from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_features import DefenderFeatures
 from spoofgym.envs.observation import observation_space
 from spoofgym.envs.privileged import PrivilegedState
+from spoofgym.envs.range_features import satellites_in_view
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
@@ -38,6 +39,8 @@ class Outcome:
         backtrack_asked: epochs that the action asked to take back, (N,); 0 where its depth was not read.
         backtrack: epochs whose fixes were taken back, (N,).
         used: whether the fix was used, (N,).
+        left_out: satellites in view that were left out of a fix that was used, (N,).
+        ignored: choices to leave a satellite out in an empty slot, (N,).
         terminated: the game is over, (N,).
     """
 
@@ -46,6 +49,8 @@ class Outcome:
     backtrack_asked: Runs
     backtrack: Runs
     used: Flags
+    left_out: Runs
+    ignored: Runs
     terminated: Flags
 
     @property
@@ -83,7 +88,7 @@ class DefenderGame:
             ValueError: a part that is unknown or does not fit the scenario.
         """
         self.config = config
-        scenario = self.scenario = make_scenario(config.scenario)
+        scenario = self.scenario = make_scenario(config.scenario, config.coupling)
         given = config.detectors if isinstance(config.detectors, tuple | list) else (config.detectors,)
         # copies: an object that the caller gives to two environments must not carry memories from one to the other
         detectors = [deepcopy(make_detector(part)) for part in given]
@@ -119,7 +124,7 @@ class DefenderGame:
         self.privileged = PrivilegedState(self.simulation, self.attacks, self.confounders, scenario.defender_scale)
         self.fields = self.features.fields
         self.observation_space = observation_space(self.fields)
-        self.action_space = spaces.MultiDiscrete([2, len(self.depths)])
+        self.action_space = spaces.MultiDiscrete([2, len(self.depths)] + [2] * scenario.slots)
         self.error = np.zeros(num_lanes)
         self.coast = np.zeros(num_lanes, dtype=np.int64)
         self.excluding = np.zeros(num_lanes, dtype=bool)
@@ -155,45 +160,73 @@ class DefenderGame:
         """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action.
 
         Args:
-            actions: (N, 2): 0 = use or 1 = exclude, and the place of the depth in the table.
+            actions: (N, 2 + S): 0 = use or 1 = exclude, the place of the depth in the table and, where the filter takes
+                ranges, 0 = use or 1 = leave out the satellite of each slot.
             restarting: indices of lanes.
 
         Raises:
             ValueError: an action lies outside the action space, or the actions have the wrong shape.
         """
         actions = self._check(actions)
-        exclude = actions[:, 0] == EXCLUDE
+        present, chosen = self.present, actions[:, 2:] == EXCLUDE
+        in_view, out = np.add.reduce(present, axis=1, dtype=np.int64), present & chosen
+        left_out = np.add.reduce(out, axis=1, dtype=np.int64)
+        exclude = (actions[:, 0] == EXCLUDE) | ((left_out == in_view) & (left_out > 0))
         asked = np.where(exclude & ~self.excluding, self.depths[actions[:, 1]], 0)
         backtrack = np.where(asked > self.coast, asked, 0)
         simulation = self.simulation
-        simulation.resolve(Decision(~exclude, backtrack if backtrack.any() else None))
+        satellites = ~out if out.any() else None
+        simulation.resolve(Decision(~exclude, backtrack if backtrack.any() else None, satellites=satellites))
         taken_back, used = simulation.navigator.backtracked.copy(), simulation.used.copy()
         self.excluding = exclude
         self.coast = np.where(used, 0, self.coast + 1)
         self.error = self._horizontal()
         self._total_error += self.error
         error = -np.minimum(self.error / self._scale, self.config.error_clip)
-        exclusion = np.where(exclude & self.clean, -self.config.exclusion_cost, 0.0)
+        share = np.where(exclude, 1.0, left_out / np.maximum(in_view, 1))
+        exclusion = np.where((share > 0.0) & self.clean, -self.config.exclusion_cost * share, 0.0)
+        left_out = np.where(used, left_out, 0)
+        ignored = np.add.reduce(chosen & ~present, axis=1, dtype=np.int64)
         if restarting is not None and len(restarting):
             simulation.restart(restarting)
         simulation.observe()
         if restarting is not None and len(restarting):
             self._begin(restarting)
         self.features.update(self.excluding, self.coast, self._all)
-        return Outcome(error, exclusion, asked, taken_back, used, self.index == self._horizon)
+        over = self.index == self._horizon
+        return Outcome(error, exclusion, asked, taken_back, used, left_out, ignored, over)
 
     def _check(self, actions: NDArray[Any]) -> Runs:
-        given = np.asarray(actions)
-        if given.shape != (self.num_lanes, 2):
-            raise ValueError(f"actions must have shape ({self.num_lanes}, 2), got {given.shape}")
+        given, most = np.asarray(actions), self.action_space.nvec
+        shape = (self.num_lanes, len(most))
+        if given.shape != shape:
+            raise ValueError(f"actions must have shape {shape}, got {given.shape}")
         whole = given.astype(np.int64)
-        wrong = (whole != given) | (whole < 0) | (whole >= self.action_space.nvec)
+        wrong = (whole != given) | (whole < 0) | (whole >= most)
         if wrong.any():
             lane = int(np.flatnonzero(wrong.any(axis=1))[0])
+            satellites = f", then {len(most) - 2} times 0 or 1" if len(most) > 2 else ""
             raise ValueError(
-                f"action of lane {lane} must be whole numbers, [0 or 1, 0 to {len(self.depths) - 1}], got {given[lane]}"
+                f"action of lane {lane} must be whole numbers, [0 or 1, 0 to {len(self.depths) - 1}{satellites}], "
+                f"got {given[lane]}"
             )
         return whole
+
+    @property
+    def present(self) -> Flags:
+        """Whether each slot holds a satellite in the present epoch, (N, S); none in an outage, S = 0 on fixes."""
+        return satellites_in_view(self.simulation)
+
+    def action_masks(self) -> Flags:
+        """Which value of each part of the action is open to it, part after part, (N, sum of the parts' numbers).
+
+        As MaskablePPO of sb3-contrib expects. To leave a satellite out is open where its slot holds one; all else is
+        always open.
+        """
+        masks = np.ones((self.num_lanes, int(self.action_space.nvec.sum())), dtype=bool)
+        first = 2 + len(self.depths)
+        masks[:, first + EXCLUDE :: 2] = self.present
+        return masks
 
     @property
     def attacked(self) -> Flags:
@@ -226,7 +259,13 @@ class DefenderGame:
             "backtrack_asked": outcome.backtrack_asked,
             "backtrack": outcome.backtrack,
             "reward_terms": {"error": outcome.error, "exclusion": outcome.exclusion},
+            **self._satellite_values(outcome),
         }
+
+    def _satellite_values(self, outcome: Outcome) -> dict[str, Runs]:
+        if not self.scenario.slots:
+            return {}
+        return {"satellites_left_out": outcome.left_out, "satellites_ignored": outcome.ignored}
 
     def end_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos of games that are over."""

@@ -33,16 +33,21 @@ class Field:
     scale: float
 
 
-def spoofer_fields(knowledge: str, dimension: int, detectors: tuple[str, ...]) -> tuple[Field, ...]:
+def spoofer_fields(
+    knowledge: str, dimension: int, detectors: tuple[str, ...], clock: bool = False
+) -> tuple[Field, ...]:
     """The entries of the spoofer's observation, in order.
 
     Args:
         knowledge: "blind", "shadow" or "full".
-        dimension: m, of the fix.
+        dimension: m, of the fix; 3 where ranges are turned into a position.
         detectors: their names, for "full".
+        clock: whether the spoofer pulls the receiver's clock, too.
     """
     axes = [f"{kind}{axis}" for kind in ("", "velocity ")[: dimension // 3] for axis in AXES]
     result = [Field(f"offset {axis}", "m", 10.0) for axis in AXES]
+    if clock:
+        result.append(Field("offset of the clock", "m", 10.0))
     result.append(Field("elapsed fraction of the game", "1", 0.0))
     result += [Field(f"tracked velocity {axis}", "m/s", 100.0) for axis in AXES]
     result.append(Field("tracking sigma", "m", 1.0))
@@ -51,6 +56,8 @@ def spoofer_fields(knowledge: str, dimension: int, detectors: tuple[str, ...]) -
         result += [Field(f"mean whitened innovation, coming, offset held, {axis}", "sigma", 2.0) for axis in axes]
         result += [Field(f"mean position error {axis}", "m", 10.0) for axis in AXES]
         result += [Field(f"mean velocity error {axis}", "m/s", 1.0) for axis in AXES]
+        if clock:
+            result.append(Field("mean clock error", "m", 10.0))
     if knowledge == "full":
         result += [Field(f"whitened innovation, last, {axis}", "sigma", 2.0) for axis in axes]
         for name in detectors:

@@ -86,11 +86,14 @@ class SB3VecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Refused: lanes are no objects of their own.
+        """``action_masks``, for MaskablePPO, where the vector environment has it, (D,) for each lane asked for.
 
         Raises:
-            AttributeError: always.
+            AttributeError: another method: lanes are no objects of their own.
         """
+        if method_name == "action_masks" and self.has_attr(method_name):
+            masks = self.vector_env.action_masks()  # type: ignore[attr-defined]
+            return [masks[lane] for lane in self._get_indices(indices)]
         raise AttributeError(f"lanes are no objects of their own: {method_name!r} cannot be called on them")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: VecEnvIndices = None) -> list[bool]:

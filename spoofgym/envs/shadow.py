@@ -22,6 +22,30 @@ GRAIN = 4096
 """Lanes below which a slice is not worth a thread."""
 
 
+def require_fitting(victim: Scenario, shadow: Scenario) -> None:
+    """Refuse a shadow filter that cannot run beside the victim's.
+
+    Args:
+        victim: scenario of the game.
+        shadow: the scenario that the spoofer believes in.
+
+    Raises:
+        ValueError: another timeline, coupling or dimension of the fix than the victim's.
+    """
+    mine, theirs = victim.timeline, shadow.timeline
+    pairs: dict[str, tuple[object, object]] = {
+        "start, s": (theirs.start, mine.start),
+        "interval, s": (theirs.interval, mine.interval),
+        "epochs": (theirs.num_epochs, mine.num_epochs),
+        "coupling": (shadow.coupling, victim.coupling),
+    }
+    if shadow.coupling == victim.coupling == "loose":
+        pairs["dimension of the fix"] = (shadow.dimension, victim.dimension)
+    differing = [f"{name}: {has} instead of {needs}" for name, (has, needs) in pairs.items() if has != needs]
+    if differing:
+        raise ValueError(f"shadow {shadow.name!r} does not fit the game {victim.name!r}: {'; '.join(differing)}")
+
+
 def shadow_model(victim: Scenario, shadow: Scenario) -> LinearModel:
     """The linear model that a spoofer runs in place of the victim's: that of the scenario it takes the victim for.
 
@@ -30,18 +54,9 @@ def shadow_model(victim: Scenario, shadow: Scenario) -> LinearModel:
         shadow: the scenario that the spoofer believes in.
 
     Raises:
-        ValueError: another timeline or dimension of the fix than the victim's, or a scenario without a linear model.
+        ValueError: as `require_fitting`, or a scenario without a linear model.
     """
-    mine, theirs = victim.timeline, shadow.timeline
-    pairs = {
-        "start, s": (theirs.start, mine.start),
-        "interval, s": (theirs.interval, mine.interval),
-        "epochs": (theirs.num_epochs, mine.num_epochs),
-        "dimension of the fix": (shadow.dimension, victim.dimension),
-    }
-    differing = [f"{name}: {has} instead of {needs}" for name, (has, needs) in pairs.items() if has != needs]
-    if differing:
-        raise ValueError(f"shadow {shadow.name!r} does not fit the game {victim.name!r}: {'; '.join(differing)}")
+    require_fitting(victim, shadow)
     return shadow.linear_model()
 
 

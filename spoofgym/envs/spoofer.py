@@ -28,6 +28,11 @@ class SpooferEnv(SingleEnv):
     On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
     fixes (`docs/robot.md`). The robot knows its height, and only the horizontal error counts, there as everywhere.
 
+    With `coupling="tight"` (`kujur-flight`, which is tight by itself, and `liu-flight`) the filter takes the ranges to
+    the satellites instead of fixes: code and carrier, or code and range rate. The spoofer then moves all ranges as a
+    receiver at the offset would see them, and pulls the receiver's clock as well. Only the horizontal error is scored
+    there, too: what becomes of the clock earns nothing, and a clock that jumps is seen.
+
     ```python
     import gymnasium
 
@@ -47,6 +52,15 @@ class SpooferEnv(SingleEnv):
 
     On `song-robot` "up" does not enter the estimate; it still shows in tests that look at the height, as `snapshot`
     does.
+
+    With `coupling="tight"` it is `Box(-1.0, 1.0, (4,), float32)`, and `action="rate"` is the only kind:
+
+    | Place | What changes until the coming epoch | One unit |
+    |---|---|---|
+    | 0 | offset east | the scenario's largest drag-off rate (4 m/s on the Kujur flight) |
+    | 1 | offset north | the same |
+    | 2 | offset up | the same |
+    | 3 | offset of the receiver's clock, as a distance | the scenario's `clock_rate` (4 m/s on the Kujur flight) |
 
     ## Observation Space
 
@@ -87,6 +101,11 @@ class SpooferEnv(SingleEnv):
       scale 2 sigma) and, for each detector, its statistic over its threshold (entry 23, scale 1) and its threshold
       (entry 24, scale 25): 25 entries with one detector, 2 more for each further one.
     - Where the receiver gives velocity too (m = 6) every group of innovations has 6 entries instead of 3.
+    - With `coupling="tight"` two entries come in, so that there are 9, 22 and 27: "offset of the clock" (m, scale 10)
+      after "offset up", and "mean clock error" (m, scale 10) after "mean velocity error up". The innovations are those
+      of the ranges turned into a position (`Innovation.in_position`), whitened there: 3 entries, however many
+      satellites there are. A pull of the clock shows in them as far as the filter takes it for motion. In a slot where
+      a satellite rises the shadow filter's mean errors begin at zero.
     - With `frames` above 1 the observation has the entries of that many epochs, one after the other: first those of
       the present epoch, as above, then those of one epoch ago ("offset east, 1 epoch ago"), and so on. Epochs before
       epoch 0 show what epoch 0 showed.
@@ -125,6 +144,11 @@ class SpooferEnv(SingleEnv):
     - `error`: horizontal error of the estimate when last resolved, m. For scores only: no spoofer knows it.
     - `alarm`: whether a detector alarms in this epoch (steps only).
     - `reward_terms`: `growth` and `forfeit` (steps only).
+    - `kappa`: κ = σ_t² σ_s² of the present epoch, by axis `east`, `north` and `up` (steps only): variance that the
+      tracking error adds to what the CPI of Kujur et al. (2024) sums, over that which it has; σ_t is `tracking_sigma`,
+      1 / σ_s the sigma of the position that the innovation asks for. Where it is far below 1 the CPI has no power; 0
+      without tracking error.
+    - `clock_error`: estimate minus truth of the receiver's clock when last resolved, m (`coupling="tight"` only).
     - `outcome`: "detected" if any alarm was raised in the game, else "undetected" (last step of a terminated game
       only).
     - `is_success`: whether undetected (with `outcome` only).
@@ -145,17 +169,23 @@ class SpooferEnv(SingleEnv):
     | `tracking_time` | `0.0` | correlation time of that error, s; 0: white |
     | `frames` | `1` | epochs that the observation holds, the present one included |
     | `shadow` | `None` | scenario whose filter the spoofer takes for the victim's, see below; None: the victim's own |
+    | `coupling` | `None` | "loose" (the filter takes fixes) or "tight" (ranges), see below; None: as the scenario is |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
     `tracking_sigma`: the spoofer knows the vehicle's position with this error per axis and epoch, which adds to the
     offset that it means to send, and its velocity with an independent one over the interval. It changes what is sent
-    and seen, not how it is scored. Both are white, or with a `tracking_time` first-order Gauss-Markov.
+    and seen, not how it is scored. Both are white, or with a `tracking_time` first-order Gauss-Markov. The offset of
+    the clock is sent as it is meant.
 
     `shadow`: the spoofer who does not know the victim exactly. Its shadow filter, which makes the mean entries and
-    turns the "innovation" action into an offset, has the linear model of this scenario, e.g.
+    turns the "innovation" action into an offset, has the model of this scenario, e.g.
     `shadow="liu-flight:imu=tactical"`; the victim, its detectors and the score stay those of `scenario`. Both must
-    have the same epochs and the same dimension of the fix. A "blind" spoofer has no shadow filter.
+    have the same epochs, the same coupling and, if loose, the same dimension of the fix. A "blind" spoofer has no
+    shadow filter.
+
+    `coupling` is written into the specifications of `scenario` and `shadow` where these have the option; a scenario
+    without it, or an object of the other coupling, is refused.
 
     With `on_alarm="respond"` nothing is taken back: the return times `error_scale` is the growth of the error
     whatever was detected. The shadow filter still assumes that every fix is used.

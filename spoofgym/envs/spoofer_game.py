@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -15,12 +15,16 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.detectors.cpi_theory import kappa
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
-from spoofgym.envs.observation import Squash, observation_space, spoofer_fields
-from spoofgym.envs.shadow import ShadowFilter, shadow_model
+from spoofgym.envs.observation import AXES, Squash, observation_space, spoofer_fields
+from spoofgym.envs.shadow import ShadowFilter, require_fitting, shadow_model
+from spoofgym.envs.tight_shadow import TightShadowFilter
+from spoofgym.navigation.interface import RangeNavigator
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
@@ -61,7 +65,9 @@ class SpooferGame:
         simulation: the world.
         shadow: the spoofer's copy of the filter, or None for a blind one.
         error: horizontal error of the estimate when last resolved, (N,), m.
-        offset: that the spoofer means to send in the present epoch, (N, 3), m ENU.
+        clock_error: of the receiver's clock when last resolved, (N,), m; 0 where the filter takes fixes.
+        offset: that the spoofer means to send in the present epoch, (N, 3), m ENU; (N, 4), with that of the receiver's
+            clock, m, where the filter takes ranges.
     """
 
     def __init__(self, config: SpooferConfig, num_lanes: int) -> None:
@@ -71,7 +77,13 @@ class SpooferGame:
             ValueError: a part that is unknown or does not fit the scenario.
         """
         self.config = config
-        scenario = make_scenario(config.scenario)
+        scenario = make_scenario(config.scenario, config.coupling)
+        self._ranges = scenario.coupling == "tight"
+        if self._ranges and config.action == "innovation":
+            raise ValueError(
+                f"action 'innovation' is for filters on fixes: scenario {scenario.name!r} is tightly coupled, and no "
+                "offset provokes any innovation of the ranges; use action='rate'"
+            )
         given = config.detector if isinstance(config.detector, tuple | list) else (config.detector,)
         # copies: an object that the caller gives to two environments must not carry memories from one to the other
         detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
@@ -86,21 +98,24 @@ class SpooferGame:
         )
         self.scenario = scenario
         self.num_lanes = num_lanes
-        self.shadow: ShadowFilter | None = None
+        self.shadow: ShadowFilter | TightShadowFilter | None = None
         if config.knowledge != "blind":
-            believed = scenario if config.shadow is None else make_scenario(config.shadow)
-            self.shadow = ShadowFilter(shadow_model(scenario, believed), num_lanes, self.simulation.slices)
-        fields = spoofer_fields(config.knowledge, scenario.dimension, tuple(self.simulation.detectors))
+            believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
+            self.shadow = self._shadow_filter(believed)
+        dimension = 3 if self._ranges else scenario.dimension
+        fields = spoofer_fields(config.knowledge, dimension, tuple(self.simulation.detectors), self._ranges)
         self.fields = stacked_fields(fields, config.frames)
         self.observation_space = observation_space(self.fields)
-        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
+        rates = (*scenario.drag_off_rate, scenario.clock_rate) if self._ranges else scenario.drag_off_rate
+        self.action_space = spaces.Box(-1.0, 1.0, (len(rates),), np.float32)
         self.error = np.zeros(num_lanes)
+        self.clock_error = np.zeros(num_lanes)
         self._squash = Squash(fields)
         self._frames = FrameStack(num_lanes, config.frames, len(fields))
         self._start_error = np.zeros(num_lanes)
-        self.offset = np.zeros((num_lanes, 3))
+        self.offset = np.zeros((num_lanes, len(rates)))
         self._velocity = scenario.velocity()
-        self._rate = np.array(scenario.drag_off_rate) * scenario.timeline.interval
+        self._rate = np.array(rates) * scenario.timeline.interval
         self._horizon = scenario.timeline.num_epochs
         self._interval = scenario.timeline.interval
         self._tracking_sigma = np.full((num_lanes, 1), config.tracking_sigma)
@@ -109,6 +124,13 @@ class SpooferGame:
         self._alarmed = np.zeros(num_lanes, dtype=bool)
         self._nobody = np.zeros(num_lanes, dtype=bool)
         self._thresholds = np.array([detector.threshold for detector in detectors])
+
+    def _shadow_filter(self, believed: Scenario) -> ShadowFilter | TightShadowFilter:
+        """The filter of the scenario for which the spoofer takes the victim's, run in expectation."""
+        if not self._ranges:
+            return ShadowFilter(shadow_model(self.scenario, believed), self.num_lanes, self.simulation.slices)
+        require_fitting(self.scenario, believed)
+        return TightShadowFilter(believed.tight_model(), self.num_lanes, self.simulation.slices)
 
     @property
     def index(self) -> Runs:
@@ -125,6 +147,7 @@ class SpooferGame:
         error = self._horizontal()[lanes]
         self.error[lanes] = error
         self._start_error[lanes] = error
+        self._read_clock(lanes)
         self.offset[lanes] = 0.0
         self._alarmed[lanes] = False
         if self.config.tracking_sigma:
@@ -140,25 +163,30 @@ class SpooferGame:
         error = self.simulation.error
         return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
 
+    def _read_clock(self, lanes: Runs) -> None:
+        if self._ranges:
+            self.clock_error[lanes] = cast(RangeNavigator, self.simulation.navigator).clock_error[lanes]
+
     def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> Outcome:
         """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action.
 
         Args:
-            actions: in [-1, 1], (N, 3).
+            actions: in [-1, 1], (N, 3), or (N, 4) where the filter takes ranges.
             restarting: indices of lanes.
 
         Raises:
             ValueError: an action is NaN or infinite, or has the wrong shape.
         """
         actions = np.asarray(actions, dtype=np.float64)
-        if actions.shape != (self.num_lanes, 3):
-            raise ValueError(f"actions must have shape ({self.num_lanes}, 3), got {actions.shape}")
+        if actions.shape != self.offset.shape:
+            raise ValueError(f"actions must have shape {self.offset.shape}, got {actions.shape}")
         if not np.isfinite(actions).all():
             lane = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
             raise ValueError(f"action of lane {lane} is not finite: {actions[lane]}")
         simulation = self.simulation
         simulation.resolve()
         error = self._horizontal()
+        self._read_clock(self._all)
         previous = self.offset
         self.offset = self._intend(np.minimum(np.maximum(actions, -1.0), 1.0), previous)
         if restarting is not None and len(restarting):
@@ -167,7 +195,8 @@ class SpooferGame:
         sent = self.offset
         if self.config.tracking_sigma:
             following = np.minimum(simulation.epoch.index + 1, self._horizon)
-            sent = sent + self._tracking[self._all, following, :3]
+            sent = sent.copy()
+            sent[:, :3] += self._tracking[self._all, following, :3]
             if restarting is not None:
                 sent[restarting] = 0.0
         epoch = simulation.observe(sent)
@@ -184,10 +213,10 @@ class SpooferGame:
         return outcome
 
     def _intend(self, actions: Floats, previous: Floats) -> Floats:
-        """The offset that the spoofer means to send, (N, 3), m ENU."""
+        """The offset that the spoofer means to send, (N, 3) or (N, 4), m ENU and m."""
         if self.config.action == "rate":
             return previous + actions * self._rate
-        assert self.shadow is not None
+        assert isinstance(self.shadow, ShadowFilter)
         following = np.minimum(self.index + 1, self._horizon)
         return self.shadow.offset_for(following, INNOVATION_UNIT * actions)
 
@@ -202,6 +231,7 @@ class SpooferGame:
             lanes = np.flatnonzero(last)
             self.simulation.resolve(runs=lanes)
             error[lanes] = self._horizontal()[lanes]
+            self._read_clock(lanes)
         scale = self.scenario.error_scale
         growth = (error - self.error) / scale
         forfeit = np.where(caught, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
@@ -222,20 +252,40 @@ class SpooferGame:
         if self.shadow is not None:
             mean = self.shadow.mean
             parts += [self.shadow.whitened, self.shadow.coming, mean[:, 6:9], mean[:, 3:6]]
+            if isinstance(self.shadow, TightShadowFilter):
+                parts.append(self.shadow.clock[:, None])
             if self.config.knowledge == "full":
-                parts.append(epoch.innovation.whitened)
+                parts.append(epoch.innovation.in_position.whitened)
                 for statistic, threshold in zip(epoch.statistics.values(), self._thresholds, strict=True):
                     parts.append(np.stack([statistic / threshold, np.full(self.num_lanes, threshold)], axis=1))
         return self._squash(np.concatenate(parts, axis=1))
 
+    def _kappa(self) -> Floats:
+        """κ per axis of the position: what the tracking error adds to the variance of the CPI's summands, (N, 3)."""
+        information = np.zeros((self.num_lanes, 3))
+        if self.config.tracking_sigma:
+            response = self.simulation.epoch.innovation.response
+            for measurement in range(response.shape[1]):
+                information += response[:, measurement] ** 2
+        return kappa(self.config.tracking_sigma, information)
+
     def reset_values(self) -> dict[str, Any]:
         """Infos after a reset, of all lanes."""
-        return {"epoch": self.index, "error": self.error}
+        return {"epoch": self.index, "error": self.error, **self._clock_values()}
 
     def step_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos after a step, of all lanes."""
-        terms = {"growth": outcome.growth, "forfeit": outcome.forfeit}
-        return {"epoch": self.index, "error": self.error, "alarm": outcome.alarm, "reward_terms": terms}
+        return {
+            "epoch": self.index,
+            "error": self.error,
+            "alarm": outcome.alarm,
+            "reward_terms": {"growth": outcome.growth, "forfeit": outcome.forfeit},
+            "kappa": dict(zip(AXES, self._kappa().T, strict=True)),
+            **self._clock_values(),
+        }
+
+    def _clock_values(self) -> dict[str, Floats]:
+        return {"clock_error": self.clock_error} if self._ranges else {}
 
     def end_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos of games that are over."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from spoofgym.arrays import Flags
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.native import NativeVectorEnv
@@ -20,3 +21,8 @@ class DefenderVectorEnv(NativeVectorEnv):
 
     config_type = DefenderConfig
     game_type = DefenderGame
+
+    def action_masks(self) -> Flags:
+        """Which values of the actions are open to each lane, (N, M), as `DefenderGame.action_masks`."""
+        masks: Flags = self.game.action_masks()
+        return masks

@@ -114,6 +114,23 @@ def test_a_defender_plays_the_likeliest_action(defender):
     assert len(set(actions[:, 1])) > 2
 
 
+def test_a_defender_of_ranges_plays_the_likeliest_choice_of_each_satellite(defender):
+    """Three slots by its layout, so that of 13 outputs 5 are of the depth."""
+    rng = np.random.default_rng(5)
+    layout = (*(f"entry {i}" for i in range(4)), *(f"satellite in slot {i}" for i in range(3)))
+    weights = (*defender.weights[:-1], rng.normal(size=(13, 16)).astype(np.float32))
+    biases = (*defender.biases[:-1], rng.normal(size=13).astype(np.float32))
+    policy = LearnedDefender("r", defender.config, layout, weights, biases)
+    assert (policy.slots, policy.depths) == (3, DEPTHS)
+    observation = rng.uniform(-1, 1, (200, 7)).astype(np.float32)
+    distribution = MultiCategoricalDistribution([2, DEPTHS, 2, 2, 2])
+    logits = torch.from_numpy(policy.outputs(observation))
+    actions = policy.act(observation)
+    np.testing.assert_array_equal(actions, distribution.proba_distribution(logits).mode().numpy())
+    assert (actions[:, 2:].min(axis=0) == 0).all()
+    assert (actions[:, 2:].max(axis=0) == 1).all()
+
+
 def test_a_saved_defender_comes_back(defender, tmp_path):
     defender.save(tmp_path)
     environment = {"scenario": "foi-drive:horizon=60", "detectors": ["snapshot"], "clean": 0.25}

@@ -66,6 +66,8 @@ def test_the_victim_named_as_shadow_is_known():
         {"forfeit": 0.5},
         {"on_alarm": "respond"},
         {"scenario": "liu-flight:markov_sigma=2,markov_time=30"},
+        {"scenario": "kujur-flight:horizon=12,onset=60"},
+        {"scenario": "liu-flight:horizon=12,onset=60", "coupling": "tight"},
     ],
 )
 def test_games_without_a_known_probability_are_refused(arguments):

@@ -125,7 +125,7 @@ def test_interruption_leaves_a_usable_policy(tmp_path):
 @pytest.mark.parametrize(
     ("program", "arguments", "message"),
     [
-        (spoofer, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: foi-drive, liu-flight"),
+        (spoofer, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: foi-drive, kujur-flight, liu-flight"),
         (spoofer, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: acceleration, acna, aime"),
         (spoofer, ["--knowledge", "blind", "--action", "innovation"], "knowledge must be 'shadow' or 'full'"),
         (evaluate, ["--scenario", "liu-flight:horizon=0"], "horizon must be 1 epoch or more, got 0"),

@@ -1,0 +1,33 @@
+"""Short flights on ranges under other skies: few satellites, one that sets, one that rises."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import pytest
+
+from spoofgym.scenarios import make_scenario
+from spoofgym.tight_scenario import TightScenario
+
+FLIGHT = "kujur-flight:horizon=40,onset=60"
+
+
+@lru_cache(maxsize=8)
+def flight_under(hour: float, mask: float) -> TightScenario:
+    """The short Kujur flight at an hour of the constellation's day, with an elevation mask in degrees."""
+    flight = make_scenario(FLIGHT)
+    assert isinstance(flight, TightScenario)
+    return replace(
+        flight, name=f"flight at {hour:g} h above {mask:g} degrees", mask=math.radians(mask), start_time=3600.0 * hour
+    )
+
+
+@pytest.fixture
+def under() -> Callable[[float, float], TightScenario]:
+    """The flight under a sky.
+
+    (4.0, 5.0): eight satellites; (8.5, 15.0): seven, of which one sets; (9.5, 25.0): five, of which one sets; (10.7,
+    20.0): four, to which one rises; (5.64236, 5.0): ten, of which one sets and another rises into its slot.
+    """
+    return flight_under
