@@ -144,10 +144,9 @@ class SpooferEnv(SingleEnv):
     - `error`: horizontal error of the estimate when last resolved, m. For scores only: no spoofer knows it.
     - `alarm`: whether a detector alarms in this epoch (steps only).
     - `reward_terms`: `growth` and `forfeit` (steps only).
-    - `kappa`: κ = σ_t² σ_s² of the present epoch, by axis `east`, `north` and `up` (steps only): variance that the
-      tracking error adds to what the CPI of Kujur et al. (2024) sums, over that which it has; σ_t is `tracking_sigma`,
-      1 / σ_s the sigma of the position that the innovation asks for. Where it is far below 1 the CPI has no power; 0
-      without tracking error.
+    - `kappa`: κ = σ_t² σ_s² of the present epoch, by axis `east`, `north` and `up` (steps with a `tracking_sigma`, σ_t,
+      only): variance that the tracking error adds to what the CPI of Kujur et al. (2024) sums, over that which it has;
+      1 / σ_s is the sigma of the position that the innovation asks for. Where κ is far below 1 the CPI has no power.
     - `clock_error`: estimate minus truth of the receiver's clock when last resolved, m (`coupling="tight"` only).
     - `outcome`: "detected" if any alarm was raised in the game, else "undetected" (last step of a terminated game
       only).

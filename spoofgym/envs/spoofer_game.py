@@ -260,14 +260,15 @@ class SpooferGame:
                     parts.append(np.stack([statistic / threshold, np.full(self.num_lanes, threshold)], axis=1))
         return self._squash(np.concatenate(parts, axis=1))
 
-    def _kappa(self) -> Floats:
-        """κ per axis of the position: what the tracking error adds to the variance of the CPI's summands, (N, 3)."""
+    def _kappa_values(self) -> dict[str, dict[str, Floats]]:
+        """κ per axis of the position: what the tracking error adds to the variance of the CPI's summands."""
+        if not self.config.tracking_sigma:
+            return {}
         information = np.zeros((self.num_lanes, 3))
-        if self.config.tracking_sigma:
-            response = self.simulation.epoch.innovation.response
-            for measurement in range(response.shape[1]):
-                information += response[:, measurement] ** 2
-        return kappa(self.config.tracking_sigma, information)
+        response = self.simulation.epoch.innovation.response
+        for measurement in range(response.shape[1]):
+            information += response[:, measurement] ** 2
+        return {"kappa": dict(zip(AXES, kappa(self.config.tracking_sigma, information).T, strict=True))}
 
     def reset_values(self) -> dict[str, Any]:
         """Infos after a reset, of all lanes."""
@@ -280,7 +281,7 @@ class SpooferGame:
             "error": self.error,
             "alarm": outcome.alarm,
             "reward_terms": {"growth": outcome.growth, "forfeit": outcome.forfeit},
-            "kappa": dict(zip(AXES, self._kappa().T, strict=True)),
+            **self._kappa_values(),
             **self._clock_values(),
         }
 

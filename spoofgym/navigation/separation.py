@@ -187,10 +187,37 @@ def _separations(present: Floats, direction: Floats, departure: Floats, separati
         base += direction[i] * present[i]
     for s in range(separation.shape[0]):
         separation[s] = base
-    for i in range(NUM_STATES):
-        factor = direction[i]
+    # several terms at once: the sum is then loaded and stored less often
+    for i in range(0, NUM_STATES, 5):
+        b0, b1, b2, b3, b4 = direction[i], direction[i + 1], direction[i + 2], direction[i + 3], direction[i + 4]
+        e0, e1, e2, e3, e4 = departure[i], departure[i + 1], departure[i + 2], departure[i + 3], departure[i + 4]
         for s in range(separation.shape[0]):
-            separation[s] -= factor * departure[i, s]
+            separation[s] -= b0 * e0[s] + b1 * e1[s] + b2 * e2[s] + b3 * e3[s] + b4 * e4[s]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _by_slot(variance: Floats, slot: int, count: int, spread: Floats) -> None:
+    """Variances by age, (n,), for the slots of ``count`` windows, the newest in ``slot``; zero in the others."""
+    n = spread.shape[0]
+    spread[:] = 0.0
+    for age in range(min(count, slot + 1)):
+        spread[slot - age] = variance[age]
+    for age in range(slot + 1, count):
+        spread[slot - age + n] = variance[age]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _largest(separation: Floats, variance: Floats, limit: float, square: Floats, alarmed: Flags) -> float:
+    """The largest d² / σ_ss² of all slots, (n,); those without a variance have no window. Alarms above the limit."""
+    for s in range(square.shape[0]):
+        square[s] = separation[s] * separation[s] / variance[s] if variance[s] > 0.0 else 0.0
+    for s in range(square.shape[0]):
+        alarmed[s] |= square[s] > limit * limit
+    largest = 0.0
+    for s in range(square.shape[0]):
+        if square[s] > largest:
+            largest = square[s]
+    return largest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -214,27 +241,20 @@ def _separate(
     coasting_sigma: Floats,
 ) -> None:
     n = departure.shape[2]
-    separation = np.empty(n)
+    separation, spread, square = np.empty(n), np.empty(n), np.empty(n)
     for run in range(len(row)):
         k = row[run]
         if k < 0:
             continue
-        _open(run, total[run], departure, alarmed, place, count, age, clean_age)
+        slot = _open(run, total[run], departure, alarmed, place, count, age, clean_age)
         for i in range(NUM_STATES):
             for c in range(whitened.shape[1]):
                 total[run, i] -= response[k, i, c] * whitened[run, c]
         largest = 0.0
         for a in range(projected.shape[1]):
             _separations(total[run], projected[k, a], departure[run], separation)
-            for j in range(count[run]):
-                slot = place[run] - 1 - j
-                if slot < 0:
-                    slot += n
-                if variance[k, a, j] > 0.0:
-                    square = separation[slot] * separation[slot] / variance[k, a, j]
-                    largest = max(largest, square)
-                    if square > limit * limit:
-                        alarmed[run, slot] = True
+            _by_slot(variance[k, a], slot, count[run], spread)
+            largest = max(largest, _largest(separation, spread, limit, square, alarmed[run]))
             most = variance[k, a, count[run] - 1]
             separation_sigma[run, a] = np.sqrt(most)
             coasting_sigma[run, a] = np.sqrt(filtered[k, a] + most)
@@ -271,7 +291,7 @@ def _separate_own(
     coasting_sigma: Floats,
 ) -> None:
     n = departure.shape[2]
-    separation, variance = np.empty(n), np.empty(n)
+    separation, variance, square = np.empty(n), np.empty(n), np.empty(n)
     present, beyond, weight = np.empty(NUM_STATES), np.empty(PACKED), np.empty(PACKED)
     work = np.empty((NUM_STATES, NUM_STATES))
     for run in range(len(row)):
@@ -300,23 +320,31 @@ def _separate_own(
                     gained += part * part
             _separations(present, projected[k, a], departure[run], separation)
             _quadratic_forms(projected[k, a], excess[run], slot, weight, variance)
-            most = 0.0
-            for j in range(count[run]):
-                s = slot - j
-                if s < 0:
-                    s += n
-                coasted = max(variance[s], 0.0)
-                most = max(most, coasted)
-                if coasted + gained > 0.0:
-                    square = (separation[s] - moved) ** 2 / (coasted + gained)
-                    largest = max(largest, square)
-                    if square > limit * limit:
-                        alarmed[run, s] = True
+            most = _with_gained(gained, slot, count[run], variance)
+            for s in range(n):
+                separation[s] -= moved
+            largest = max(largest, _largest(separation, variance, limit, square, alarmed[run]))
             prior = covariance[run, POSITION + directions[a], POSITION + directions[a]]
             separation_sigma[run, a] = np.sqrt(most + gained)
             coasting_sigma[run, a] = np.sqrt(prior + most)
         ratio[run] = np.sqrt(largest)
         _close(run, alarmed, place, count, clean_age)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _with_gained(gained: float, slot: int, count: int, variance: Floats) -> float:
+    """Add what the present ranges tell to the variance of every open window, (n,); the largest without it.
+
+    Slots without a window have none. Rounding must not make a variance negative.
+    """
+    n, most = variance.shape[0], 0.0
+    for s in range(n):
+        age = slot - s if s <= slot else slot - s + n
+        coasted = max(variance[s], 0.0)
+        variance[s] = coasted + gained if age < count else 0.0
+        if age < count and coasted > most:
+            most = coasted
+    return most
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -384,7 +412,8 @@ def _quadratic_forms(direction: Floats, excess: Floats, slot: int, weight: Float
         base += weight[p] * excess[p, slot]
     for s in range(variance.shape[0]):
         variance[s] = -base
-    for p in range(PACKED):
-        factor = weight[p]
+    for p in range(0, PACKED, 4):
+        w0, w1, w2, w3 = weight[p], weight[p + 1], weight[p + 2], weight[p + 3]
+        m0, m1, m2, m3 = excess[p], excess[p + 1], excess[p + 2], excess[p + 3]
         for s in range(variance.shape[0]):
-            variance[s] += factor * excess[p, s]
+            variance[s] += w0 * m0[s] + w1 * m1[s] + w2 * m2[s] + w3 * m3[s]
