@@ -27,6 +27,8 @@ from train import defender, defenders, evaluate, tune
 from train.defender import VALIDATION_FILE, VALIDATION_SEED
 from train.ppo import CHECKPOINT_FILE
 
+pytestmark = pytest.mark.xdist_group("defender programs")  # one worker: the run folder is made once
+
 SCENARIO = "foi-drive:horizon=60"
 SHORT = ["--scenario", SCENARIO, "--detector", "snapshot", "--lanes", "4", "--validation-episodes", "20"]
 STEPS = 1200
@@ -193,7 +195,7 @@ def test_interruption_leaves_a_usable_policy(tmp_path):
     folder = tmp_path / "interrupted"
     command = [sys.executable, "-m", "train.defender", *SHORT, "--steps", "100000000", "--out", str(folder)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 600
     while not list(folder.rglob("events.*")) and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.2)
     time.sleep(2.0)
