@@ -140,7 +140,8 @@ class DefenderEnv(SingleEnv):
       guidance) of the filter's own covariance; horizontally that of the worst direction. They are blind to spoofing,
       because the covariance does not depend on what the ranges say (Liu 2018, section 4). Those of a detector such as
       `separation-bank`, which compares the filter with coasting solutions, are not.
-    - Alert limits are the scenario's `alert_limits` (556 m horizontally and 50 m vertically on the Kujur flight).
+    - Alert limits are the scenario's `alert_limits`: 556 m horizontally and 50 m vertically, or those of
+      `kujur-flight:horizontal_alert_limit=40,vertical_alert_limit=35`.
 
     `env.unwrapped.game.fields` gives the list of an environment.
 

@@ -56,6 +56,8 @@ def kujur_flight(
     onset: float = 900.0,
     hour: float = HOUR,
     imu: str = "kujur-navigation",
+    horizontal_alert_limit: float = ALERT_LIMITS[0],
+    vertical_alert_limit: float = ALERT_LIMITS[1],
 ) -> Scenario:
     """The flight as a game on a filter that has settled for 15 minutes.
 
@@ -67,6 +69,8 @@ def kujur_flight(
         onset: time of the last clean epoch, s.
         hour: of the constellation's day at which the flight starts.
         imu: name of the IMU grade.
+        horizontal_alert_limit: position error from which the navigation is hazardous, m.
+        vertical_alert_limit: m.
 
     Raises:
         ValueError: an unknown coupling or IMU, or a number out of range.
@@ -76,6 +80,10 @@ def kujur_flight(
     validation.whole(owner, "horizon", horizon, 1)
     validation.above(owner, "onset", onset)
     validation.finite(owner, "hour", hour)
+    limits = (
+        validation.above(owner, "horizontal_alert_limit", horizontal_alert_limit),
+        validation.above(owner, "vertical_alert_limit", vertical_alert_limit),
+    )
     name = spell(
         owner,
         coupling=None if coupling == "tight" else coupling,
@@ -83,10 +91,12 @@ def kujur_flight(
         onset=None if onset == 900.0 else onset,
         hour=None if hour == HOUR else hour,
         imu=None if imu == "kujur-navigation" else imu,
+        horizontal_alert_limit=None if limits[0] == ALERT_LIMITS[0] else limits[0],
+        vertical_alert_limit=None if limits[1] == ALERT_LIMITS[1] else limits[1],
     )
     trajectory = kujur_trajectory(onset + horizon / RATE)
     if coupling == "loose":
-        return _loose(name, trajectory, horizon, onset, hour, imu)
+        return replace(_loose(name, trajectory, horizon, onset, hour, imu), alert_limits=limits)
     return TightScenario(
         name=name,
         trajectory=trajectory,
@@ -102,7 +112,7 @@ def kujur_flight(
         drag_off_rate=DRAG_OFF_RATE,
         clock_rate=DRAG_OFF_RATE[0],
         error_scale=10.0,
-        alert_limits=ALERT_LIMITS,
+        alert_limits=limits,
     )
 
 
@@ -124,5 +134,4 @@ def _loose(
         true_position_random_walk=TUNING.position_random_walk,
         defender_scale=50.0,
         ranges=ranges,
-        alert_limits=ALERT_LIMITS,
     )

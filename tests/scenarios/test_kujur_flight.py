@@ -32,6 +32,15 @@ def test_alert_limits_are_those_of_the_approach(coupling):
     assert make_scenario(f"kujur-flight:horizon=20,onset=60,coupling={coupling}").alert_limits == (556.0, 50.0)
 
 
+@pytest.mark.parametrize("coupling", ["loose", "tight"])
+def test_alert_limits_may_be_others(coupling):
+    scenario = make_scenario(f"kujur-flight:horizon=20,onset=60,coupling={coupling},vertical_alert_limit=35")
+    assert scenario.alert_limits == (556.0, 35.0)
+    assert "vertical_alert_limit=35" in scenario.name
+    with pytest.raises(ValueError, match="horizontal_alert_limit must be a finite number greater than 0, got -1"):
+        make_scenario("kujur-flight:horizontal_alert_limit=-1")
+
+
 def test_loose_coupling_takes_fixes_from_the_same_sky():
     """R by hand: the variances of all errors of a range, from the elevations that the tight filter sees."""
     loose, tight = make_scenario(LOOSE), make_scenario("kujur-flight:horizon=20,onset=60")
