@@ -57,10 +57,10 @@ class SpooferEnv(SingleEnv):
 
     | Place | What changes until the coming epoch | One unit |
     |---|---|---|
-    | 0 | offset east | the scenario's largest drag-off rate (4 m/s on the Kujur flight) |
+    | 0 | offset east | the scenario's largest drag-off rate (0.25 m/s on the Kujur flight) |
     | 1 | offset north | the same |
     | 2 | offset up | the same |
-    | 3 | offset of the receiver's clock, as a distance | the scenario's `clock_rate` (4 m/s on the Kujur flight) |
+    | 3 | offset of the receiver's clock, as a distance | the scenario's `clock_rate` (0.25 m/s on the Kujur flight) |
 
     ## Observation Space
 

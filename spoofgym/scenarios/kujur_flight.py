@@ -37,7 +37,9 @@ ALERT_LIMITS = (556.0, 50.0)
 HOUR = 4.0
 """Of the constellation's day: eight satellites are then in view all along the flight."""
 COUPLINGS = ("loose", "tight")
-DRAG_OFF_RATE = (4.0, 4.0, 4.0)
+DRAG_OFF_RATES = {"loose": 4.0, "tight": 0.25}
+"""Largest rate of a spoofed position, m/s per axis, by coupling; ours. A carrier shows at once what a fix hides: a step
+of half a metre is always detected, so that a unit of 4 m/s would leave a spoofer nothing to choose."""
 
 
 @lru_cache(maxsize=4)
@@ -58,6 +60,7 @@ def kujur_flight(
     imu: str = "kujur-navigation",
     horizontal_alert_limit: float = ALERT_LIMITS[0],
     vertical_alert_limit: float = ALERT_LIMITS[1],
+    drag_off_rate: float | None = None,
 ) -> Scenario:
     """The flight as a game on a filter that has settled for 15 minutes.
 
@@ -71,6 +74,8 @@ def kujur_flight(
         imu: name of the IMU grade.
         horizontal_alert_limit: position error from which the navigation is hazardous, m.
         vertical_alert_limit: m.
+        drag_off_rate: largest rate of the spoofed position per axis, and of the spoofed clock, m/s; None = 0.25 where
+            the filter takes ranges, 4 where it takes fixes.
 
     Raises:
         ValueError: an unknown coupling or IMU, or a number out of range.
@@ -84,6 +89,8 @@ def kujur_flight(
         validation.above(owner, "horizontal_alert_limit", horizontal_alert_limit),
         validation.above(owner, "vertical_alert_limit", vertical_alert_limit),
     )
+    usual = DRAG_OFF_RATES[coupling]
+    fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
     name = spell(
         owner,
         coupling=None if coupling == "tight" else coupling,
@@ -93,10 +100,12 @@ def kujur_flight(
         imu=None if imu == "kujur-navigation" else imu,
         horizontal_alert_limit=None if limits[0] == ALERT_LIMITS[0] else limits[0],
         vertical_alert_limit=None if limits[1] == ALERT_LIMITS[1] else limits[1],
+        drag_off_rate=None if fastest == usual else fastest,
     )
     trajectory = kujur_trajectory(onset + horizon / RATE)
     if coupling == "loose":
-        return replace(_loose(name, trajectory, horizon, onset, hour, imu), alert_limits=limits)
+        loose = _loose(name, trajectory, horizon, onset, hour, imu)
+        return replace(loose, alert_limits=limits, drag_off_rate=(fastest,) * 3)
     return TightScenario(
         name=name,
         trajectory=trajectory,
@@ -109,8 +118,8 @@ def kujur_flight(
         tuning=TUNING,
         onset=onset,
         horizon=horizon,
-        drag_off_rate=DRAG_OFF_RATE,
-        clock_rate=DRAG_OFF_RATE[0],
+        drag_off_rate=(fastest,) * 3,
+        clock_rate=fastest,
         error_scale=10.0,
         alert_limits=limits,
     )
@@ -129,7 +138,7 @@ def _loose(
         tuning=replace(TUNING, measurement_sigma=(east, north, up)),
         onset=onset,
         horizon=horizon,
-        drag_off_rate=DRAG_OFF_RATE,
+        drag_off_rate=(DRAG_OFF_RATES["loose"],) * 3,
         error_scale=10.0,
         true_position_random_walk=TUNING.position_random_walk,
         defender_scale=50.0,

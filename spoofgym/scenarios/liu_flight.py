@@ -42,7 +42,9 @@ LIU_MANOEUVRES = (
 )
 """Turns begin at 150, 330, 480 and 680 s; from 770 s straight and level, north at 150 m/s."""
 
-DRAG_OFF_RATE = (4.0, 4.0, 4.0)
+DRAG_OFF_RATES = {"loose": 4.0, "tight": 0.5}
+"""Largest rate of a spoofed position, m/s per axis, by coupling; ours. A range rate, good to 5 cm/s, shows at once what
+a fix hides."""
 NOISES = ("white", "ranges")
 COUPLINGS = ("loose", "tight")
 
@@ -71,6 +73,7 @@ def liu_flight(
     sigma: float = 3.7,
     noise: str = "white",
     coupling: str = "loose",
+    drag_off_rate: float | None = None,
 ) -> Scenario:
     """The Liu flight: aviation-grade INS and a single-frequency GPS receiver.
 
@@ -92,6 +95,8 @@ def liu_flight(
         noise: of the fixes: ``white``, or ``ranges``.
         coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of every range itself, with the
             errors of table 1.
+        drag_off_rate: largest rate of the spoofed position per axis, and of the spoofed clock, m/s; None = 4 where the
+            filter takes fixes, 0.5 where it takes ranges.
 
     Raises:
         ValueError: an unknown name, a number out of range, a game outside the flight, or options that do not go
@@ -101,6 +106,8 @@ def liu_flight(
     validation.one_of(owner, "noise", noise, NOISES)
     validation.one_of(owner, "coupling", coupling, COUPLINGS)
     validation.above(owner, "sigma", sigma)
+    usual = DRAG_OFF_RATES[coupling]
+    fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
     coloured = markov_sigma != 0.0 or markov_time != 0.0
     name = spell(
         owner,
@@ -113,14 +120,15 @@ def liu_flight(
         sigma=None if sigma == 3.7 else sigma,
         noise=None if noise == "white" else noise,
         coupling=None if coupling == "loose" else coupling,
+        drag_off_rate=None if fastest == usual else fastest,
     )
     if coupling == "tight":
         if noise != "white" or coloured or sigma != 3.7:
             raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
-        return _tight(name, horizon, onset, rate, imu)
+        return _tight(name, horizon, onset, rate, imu, fastest)
     if noise == "ranges" and coloured:
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
-    return _loose(name, horizon, onset, rate, imu, markov_sigma, markov_time, sigma, noise)
+    return _loose(name, horizon, onset, rate, imu, fastest, markov_sigma, markov_time, sigma, noise)
 
 
 def _loose(
@@ -129,6 +137,7 @@ def _loose(
     onset: float,
     rate: float,
     imu: str,
+    fastest: float,
     markov_sigma: float,
     markov_time: float,
     sigma: float,
@@ -153,7 +162,7 @@ def _loose(
         tuning=FilterTuning(measurement_sigma=white),
         onset=onset,
         horizon=horizon,
-        drag_off_rate=DRAG_OFF_RATE,
+        drag_off_rate=(fastest,) * 3,
         error_scale=10.0,
         defender_scale=50.0,
         true_position_random_walk=FilterTuning().position_random_walk,
@@ -161,7 +170,7 @@ def _loose(
     )
 
 
-def _tight(name: str, horizon: int, onset: float, rate: float, imu: str) -> TightScenario:
+def _tight(name: str, horizon: int, onset: float, rate: float, imu: str, fastest: float) -> TightScenario:
     return TightScenario(
         name=name,
         trajectory=_trajectory(),
@@ -174,8 +183,8 @@ def _tight(name: str, horizon: int, onset: float, rate: float, imu: str) -> Tigh
         tuning=FilterTuning(),
         onset=onset,
         horizon=horizon,
-        drag_off_rate=DRAG_OFF_RATE,
-        clock_rate=DRAG_OFF_RATE[0],
+        drag_off_rate=(fastest,) * 3,
+        clock_rate=fastest,
         error_scale=10.0,
         alert_limits=Scenario.alert_limits,
         observable="rate",

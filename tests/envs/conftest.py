@@ -10,7 +10,7 @@ import pytest
 from spoofgym.scenarios import make_scenario
 from spoofgym.tight_scenario import TightScenario
 
-FLIGHT = "kujur-flight:horizon=40,onset=60"
+FLIGHT = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
 
 
 @lru_cache(maxsize=8)

@@ -84,7 +84,7 @@ def part_of_page(kind: type[Any], pattern: str) -> str:
 
 def test_four_rates_move_position_and_clock() -> None:
     """Each by its own largest rate times the interval; what lies outside the box is clipped."""
-    env = SpooferEnv(scenario=KUJUR, detector=DEAF)
+    env = SpooferEnv(scenario=KUJUR + ",drag_off_rate=4", detector=DEAF)
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (4,), np.float32)
     env.reset(seed=0)
     env.step(np.array([0.5, -0.25, 0.1, 1.0]))
@@ -93,8 +93,11 @@ def test_four_rates_move_position_and_clock() -> None:
     np.testing.assert_allclose(env.game.offset[0], [1.0, -0.5, 0.2, 0.0], atol=1e-12)
     assert env.game.simulation.clock_offset[0] == env.game.offset[0, 3]
     assert info["clock_error"] == pytest.approx(env.game.clock_error[0])
-    rates = make_scenario(KUJUR)
-    assert (rates.drag_off_rate, rates.clock_rate) == ((4.0, 4.0, 4.0), 4.0)
+    for scenario, rate in ((KUJUR, 0.25), (LIU, 0.5), (KUJUR + ",drag_off_rate=4", 4.0)):
+        rates = make_scenario(scenario)
+        assert (rates.drag_off_rate, rates.clock_rate) == ((rate, rate, rate), rate)
+    with pytest.raises(ValueError, match="drag_off_rate must be a finite number greater than 0, got 0"):
+        make_scenario("kujur-flight:drag_off_rate=0")
     with pytest.raises(ValueError, match=r"shape \(4,\), got \(3,\)"):
         env.step(np.zeros(3))
     with pytest.raises(ValueError, match="not finite"):
@@ -109,7 +112,7 @@ def test_an_innovation_cannot_be_chosen(scenario: str) -> None:
 
 @pytest.mark.parametrize(("knowledge", "place"), [("blind", 0), ("shadow", 1), ("full", 2)])
 def test_entries_of_the_spoofer_are_those_of_the_page(knowledge: str, place: int) -> None:
-    env = SpooferEnv(scenario=KUJUR, knowledge=knowledge)
+    env = SpooferEnv(scenario=KUJUR + ",drag_off_rate=4", knowledge=knowledge)
     numbers = part_of_page(SpooferEnv, r"two entries come in, so that there are ([\d, and]+):")
     assert env.observation_space.shape == (int(re.findall(r"\d+", numbers)[place]),)
     names = [field.name for field in env.game.fields]

@@ -21,8 +21,8 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
 from spoofgym.tight_scenario import TightScenario
 
-KUJUR = "kujur-flight:horizon=40,onset=60"
-LIU = "liu-flight:horizon=40,onset=60,coupling=tight"
+KUJUR = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
+LIU = "liu-flight:horizon=40,onset=60,coupling=tight,drag_off_rate=4"
 DEAF = "snapshot:threshold=1e9"
 REUSED = (5.64236, 5.0)
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0), REUSED]

@@ -17,8 +17,8 @@ from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
 from spoofgym.tight_scenario import TightScenario
 
 SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
-KUJUR = "kujur-flight:horizon=40,onset=60"
-LIU = "liu-flight:horizon=40,onset=60,coupling=tight"
+KUJUR = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
+LIU = "liu-flight:horizon=40,onset=60,coupling=tight,drag_off_rate=4"
 SHORT = "kujur-flight:horizon=6,onset=60"
 DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
