@@ -14,6 +14,7 @@ import argparse
 import json
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -119,8 +120,9 @@ def main() -> int:
     if options.json == "-":
         print(json.dumps(report))
     elif options.json is not None:
-        with open(options.json, "w") as file:
-            json.dump(report, file, indent=2)
+        path = Path(options.json)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(report, indent=2) + "\n")
     return 0
 
 

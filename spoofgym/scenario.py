@@ -84,7 +84,9 @@ class Scenario(ABC):
     @property
     def facts(self) -> FilterFacts:
         """What the designer of the filter knows."""
-        return FilterFacts(self.name, self.timeline.interval, self.bias_sigma, self.offers, self.linear_model)
+        return FilterFacts(
+            self.name, self.timeline.interval, self.bias_sigma, self.offers, self.linear_model, matched=self.matched
+        )
 
     def manoeuvres(self) -> tuple[float, ...]:
         """Times within the game at which the vehicle begins to change its velocity, s."""

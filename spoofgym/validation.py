@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
+from spoofgym.arrays import Floats
+
 
 def finite(owner: str, name: str, value: Any) -> float:
     """The value as a finite number.
@@ -25,6 +29,18 @@ def non_negative(owner: str, name: str, value: Any) -> float:
     if number < 0.0:
         raise ValueError(_message(owner, name, "a finite number, 0 or more", value))
     return number
+
+
+def non_negatives(owner: str, name: str, values: Any) -> Floats:
+    """The values, of any shape, as numbers of zero or more.
+
+    Raises:
+        ValueError: one is negative or no number.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    if not np.all(numbers >= 0.0):
+        raise ValueError(_message(owner, name, "numbers, 0 or more", float(np.min(numbers))))
+    return numbers
 
 
 def above(owner: str, name: str, value: Any, bound: float = 0.0) -> float:

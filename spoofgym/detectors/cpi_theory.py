@@ -71,8 +71,11 @@ def kappa(sigma: float, information: Floats | float) -> Floats:
     Args:
         sigma: σ_t, standard deviation of the tracking error, m.
         information: σ_s², 1/m².
+
+    Raises:
+        ValueError: σ_t is negative.
     """
-    return np.asarray(sigma**2 * information)
+    return np.asarray(validation.non_negative(OWNER, "sigma", sigma) ** 2 * information)
 
 
 def gauss_markov_covariance(num_epochs: int, sigma: float, time: float, interval: float) -> Floats:
@@ -106,7 +109,8 @@ def missed_detection_white(p_fa: float, num_epochs: int, kappa: Floats | float) 
     Raises:
         ValueError: a value is out of range.
     """
-    return special.gammainc(0.5 * num_epochs, 0.5 * cpi_threshold(p_fa, num_epochs) / (1.0 + np.asarray(kappa)))
+    ratio = 1.0 + validation.non_negatives(OWNER, "kappa", kappa)
+    return special.gammainc(0.5 * num_epochs, 0.5 * cpi_threshold(p_fa, num_epochs) / ratio)
 
 
 def missed_detection_gaussian(p_fa: float, num_epochs: int, kappa: Floats | float) -> Floats:

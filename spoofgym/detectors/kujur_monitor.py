@@ -60,6 +60,17 @@ class KujurMonitor(Ensemble):
             p_md_ss=None if p_md_ss == DEFAULT_P_MD else p_md_ss,
         )
 
+    def set_threshold(
+        self,
+        threshold: float,
+        arl0: float | None = None,
+        interval: tuple[float, float] | None = None,
+        origin: object = None,
+    ) -> None:
+        """Take a factor on both thresholds from calibration, which the protection level then has, too."""
+        super().set_threshold(threshold, arl0, interval, origin)
+        self.bank.scale = threshold
+
     @property
     def bank(self) -> SeparationBank:
         """The monitor by separation."""

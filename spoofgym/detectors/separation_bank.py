@@ -38,7 +38,7 @@ class SeparationBank(ThresholdDetector):
     tabulated; where every run has a covariance of its own they are the run's, what it has left out or taken back
     included, and an epoch that the filter does not use is separated as if it were. What was taken back is gone from the
     windows, too. A filter that was reset to its ranges separates from the coasting by the jump, too. In the strapdown
-    fidelity Φ is that along the truth. Epochs before epoch 0 are as epoch 0.
+    fidelity Φ is that along the truth. Where innovations before epoch 0 are drawn, these epochs are as epoch 0.
 
     Args:
         n: windows that are open at once, which is also their length in epochs.
@@ -49,6 +49,7 @@ class SeparationBank(ThresholdDetector):
         arl0: average run length between false alarms, epochs; a factor on all T, and so in PL, is then calibrated.
 
     Attributes:
+        scale: factor on T in the protection level that another one has calibrated; 1.
         protection_level: PL after the present epoch, (N,), m.
         coasting_sigma: σ_coast of the oldest window, (N,), m; horizontally the root of the sum of both variances.
 
@@ -76,6 +77,7 @@ class SeparationBank(ThresholdDetector):
         axes = DIRECTIONS[self.direction]
         self.p_md = validation.probability(self.kind, "p_md", p_md) / len(axes)
         self.p_fa = validation.probability(self.kind, "p_fa", DEFAULT_P_FA if p_fa is None else p_fa)
+        self.scale = 1.0
         self.multiplier = float(separation_threshold(self.p_fa, len(axes) * (self.n if split else 1), 1.0))
         if arl0 is None:
             self.threshold = 1.0
@@ -100,7 +102,8 @@ class SeparationBank(ThresholdDetector):
     def know(self, facts: FilterFacts) -> None:
         """Compute what all windows share, along the scenario."""
         assert facts.tight_model is not None
-        self._tables = coasting_tables(facts.tight_model(0), DIRECTIONS[self.direction], self.n)
+        burn_in = 0 if facts.matched else self.memory
+        self._tables = coasting_tables(facts.tight_model(burn_in), DIRECTIONS[self.direction], self.n, burn_in)
 
     def reset(self, runs: Runs) -> None:
         """Close the windows of these runs."""
@@ -117,7 +120,7 @@ class SeparationBank(ThresholdDetector):
 
     def update(self, epoch: Epoch) -> Floats:
         """The largest separation over its threshold, (N,)."""
-        factor = self.multiplier * (1.0 if self.threshold is None else self.threshold)
+        factor = self.multiplier * self.scale * (1.0 if self.threshold is None else self.threshold)
         ratio, separation, coasting = self._separate(epoch, factor)
         levels = protection_level(factor * separation, self.p_md, coasting)
         self.protection_level = np.sqrt(np.add.reduce(levels**2, axis=1))

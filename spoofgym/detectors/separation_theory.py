@@ -50,7 +50,7 @@ def separation_threshold(p_fa: float, num_windows: int, sigma: Floats | float) -
         ValueError: a value is out of range.
     """
     windows = validation.whole(OWNER, "num_windows", num_windows, 1)
-    return _multiplier("p_fa", p_fa, 2 * windows) * np.asarray(sigma)
+    return _multiplier("p_fa", p_fa, 2 * windows) * validation.non_negatives(OWNER, "sigma", sigma)
 
 
 def protection_level(threshold: Floats | float, p_md: float, coasting_sigma: Floats | float) -> Floats:
@@ -60,13 +60,16 @@ def protection_level(threshold: Floats | float, p_md: float, coasting_sigma: Flo
 
     Args:
         threshold: of |d|, from `separation_threshold`, m.
-        p_md: probability of missed detection to one side.
+        p_md: probability of missed detection to one side, at most a half.
         coasting_sigma: σ_coast = √(u' P_coast u), m.
 
     Raises:
         ValueError: a value is out of range.
     """
-    return np.asarray(threshold) + _multiplier("p_md", p_md, 1) * np.asarray(coasting_sigma)
+    if validation.probability(OWNER, "p_md", p_md) > 0.5:
+        raise ValueError(f"{OWNER}: p_md must be 0.5 or less, got {p_md!r}")
+    sigma = validation.non_negatives(OWNER, "coasting_sigma", coasting_sigma)
+    return np.asarray(threshold) + _multiplier("p_md", p_md, 1) * sigma
 
 
 def _multiplier(name: str, probability: float, parts: int) -> float:

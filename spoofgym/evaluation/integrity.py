@@ -109,8 +109,9 @@ def integrity(
     """
     error, protection_level = checked(OWNER, error, protection_level, alert_limit)
     validation.whole(OWNER, "time_to_alert", time_to_alert, 0)
-    if error.ndim != 2 or np.shape(alarm) != error.shape:
-        raise ValueError(f"{OWNER}: error and alarm must be (N, K), got {error.shape} and {np.shape(alarm)}")
+    alarm = np.asarray(alarm, dtype=np.bool_)
+    if error.ndim != 2 or alarm.shape != error.shape:
+        raise ValueError(f"{OWNER}: error and alarm must be (N, K), got {error.shape} and {alarm.shape}")
     size = np.abs(error)
     available = protection_level <= alert_limit
     served = available & ~alarm
@@ -134,6 +135,7 @@ def integrity_failure(error: Floats, alert_limit: float, alarm: Flags, time_to_a
 
     Where the run ends before that time is over, nothing has failed yet.
     """
+    alarm = np.asarray(alarm, dtype=np.bool_)
     epochs = error.shape[1]
     silent = np.zeros(error.shape, dtype=np.bool_)
     decided = max(epochs - time_to_alert, 0)

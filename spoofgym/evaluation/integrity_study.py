@@ -184,8 +184,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Compare protection levels from P and from solution separation, clean and spoofed."""
     parser = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.integrity_study", description=main.__doc__)
     parser.add_argument("--runs", type=_count, default=200, help="of each replica (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of run 0 (default: %(default)s)")
-    parser.add_argument("--figure", type=Path, help="write the picture to this file (needs matplotlib)")
+    parser.add_argument("--seed", type=_seed, default=0, help="of run 0 (default: %(default)s)")
+    parser.add_argument("--figure", type=_figure, help="write the picture to this file: .png, .svg, .pdf")
     options = parser.parse_args(arguments)
     print(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")
     print(
@@ -205,6 +205,19 @@ def _count(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number, 1 or more, got {text!r}")
     return value
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a whole number, 0 or more, got {text!r}")
+    return int(text)
+
+
+def _figure(text: str) -> Path:
+    path = Path(text)
+    if path.suffix not in (".png", ".svg", ".pdf") or path.is_dir():
+        raise argparse.ArgumentTypeError(f"expected a file that ends with .png, .svg or .pdf, got {text!r}")
+    return path
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
@@ -55,9 +55,10 @@ def evaluate_recorded(
 
     Returns:
         A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
-        detected, time_to_detect_s (from the attack's onset to the first alarm after it), error_at_detection_m,
+        detected, time_to_detect_s (from the attack's onset to the first alarm owed to it), error_at_detection_m,
         max_error_m (largest horizontal error after the onset). None where a thing does not exist: clean errors without
-        a reference, time and error of a detection that did not happen. An alarm without an attack is no detection.
+        a reference, time and error of a detection that did not happen. An alarm without an attack is no detection, nor
+        is one that comes at the same epoch of the clean log.
 
     Raises:
         ValueError: what `Simulation` refuses, or a log too short for clean figures.
@@ -70,7 +71,8 @@ def evaluate_recorded(
         "false_alarms": clean.false_alarms,
         "clean_epochs": clean.epochs,
     }
-    return [{"attack": attack.name} | common | _play(scenario, attack, detectors) for attack in attacks]
+    false = _clean_alarms(scenario, detectors)
+    return [{"attack": attack.name} | common | _play(scenario, attack, detectors, false) for attack in attacks]
 
 
 def clean_figures(scenario: RecordedScenario, detectors: Sequence[Detector]) -> CleanFigures:
@@ -182,8 +184,22 @@ def _coast(
             result[i] = p
 
 
-def _play(scenario: RecordedScenario, attack: Attack, detectors: Sequence[Detector]) -> dict[str, Any]:
-    """The part of a row that depends on the attack."""
+def _clean_alarms(scenario: RecordedScenario, detectors: Sequence[Detector]) -> Flags:
+    """Whether any detector alarms in the game without an attack, at epochs 1..K, (K,)."""
+    simulation = Simulation(scenario, None, detectors, seed=0, fidelity="strapdown")
+    alarms = []
+    simulation.reset()
+    for _ in range(scenario.timeline.num_epochs):
+        simulation.resolve()
+        simulation.observe()
+        alarms.append(simulation.alarm[0])
+    return np.array(alarms)
+
+
+def _play(
+    scenario: RecordedScenario, attack: Attack, detectors: Sequence[Detector], false: Flags
+) -> dict[str, Any]:
+    """The part of a row that depends on the attack; ``false``: the alarms without one, (K,)."""
     simulation = Simulation(scenario, attack, detectors, seed=0, fidelity="strapdown")
     onset = scenario.timeline.start if attack.onset is None else attack.onset
     spoofing = not isinstance(attack, NoAttack)
@@ -191,10 +207,10 @@ def _play(scenario: RecordedScenario, attack: Attack, detectors: Sequence[Detect
     largest = 0.0
     simulation.reset()
     simulation.resolve()
-    for _ in range(scenario.timeline.num_epochs):
+    for alarmed in false:
         time = float(simulation.observe().time[0])
         after = time > onset
-        if after and spoofing and detection is None and simulation.alarm[0]:
+        if after and spoofing and detection is None and simulation.alarm[0] and not alarmed:
             detection = time - onset, float(horizontal(simulation.error)[0])
         simulation.resolve()
         if after:

@@ -68,9 +68,10 @@ def stanford_diagram(
         ValueError: a shape or a value does not fit.
     """
     error, protection_level = checked("stanford", error, protection_level, alert_limit)
-    if alarm is not None and np.shape(alarm) != error.shape:
-        raise ValueError(f"stanford: alarm must have the shape {error.shape}, got {np.shape(alarm)}")
-    used = np.ones(error.shape, dtype=np.bool_) if alarm is None else ~alarm
+    alarmed = np.zeros(error.shape, dtype=np.bool_) if alarm is None else np.asarray(alarm, dtype=np.bool_)
+    if alarmed.shape != error.shape:
+        raise ValueError(f"stanford: alarm must have the shape {error.shape}, got {alarmed.shape}")
+    used = ~alarmed
     size, level = np.abs(error[used]), protection_level[used]
     edges = float(alert_limit) / CELLS_TO_LIMIT * np.arange(round(REACH * CELLS_TO_LIMIT) + 1, dtype=np.float64)
     edges[CELLS_TO_LIMIT] = alert_limit
@@ -135,7 +136,11 @@ def draw_side_by_side(diagrams: dict[str, StanfordDiagram], path: Path, heading:
 
     Raises:
         ImportError: matplotlib is missing.
+        ValueError: there is no diagram.
     """
+    if not diagrams:
+        raise ValueError("stanford: there must be a diagram to draw, got none")
+    path = Path(path)
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.cm import ScalarMappable

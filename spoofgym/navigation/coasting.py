@@ -11,12 +11,15 @@ a direction u, with b_k = C_k' u,
 
     u' (x_KF - x_coast) = b_k' (E_k - E_j),        u' (P_coast - P_KF) u = b_k' (M_j - M_k) b_k,
 
-and no second solution is ever carried forward. The fifteen inertial states suffice: no other state acts on them between
-epochs. The separation and its variance are of Kujur 2024, eqs 49 and 50; the common origin is ours.
+and no second solution is ever carried forward. C grows without end, and with it what rounding leaves of the
+differences: the origin is moved on from time to time, E <- C E and M <- C M C' + Γ, and C begins anew. The fifteen
+inertial states suffice: no other state acts on them between epochs. The separation and its variance are of Kujur 2024,
+eqs 49 and 50; the common origin is ours.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,16 +30,24 @@ from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.tight_model import TightModel
 from spoofgym.navigation.tight_states import INERTIAL, POSITION
 
+ORIGIN_LIFE = 600.0
+"""Time after which the origin is moved on, s: about the time constant of a free vertical channel, in which C grows.
+It is never moved twice within the windows that are open at once."""
+
 PACKED = NUM_STATES * (NUM_STATES + 1) // 2
 """Entries of the lower triangle of a covariance of the inertial states."""
 
 
 @dataclass(frozen=True)
 class CoastingTables:
-    """What all windows of all runs share, by epoch; rows are the epochs 1 - n..K, those before epoch 0 as epoch 0.
+    """What all windows of all runs share, by epoch; rows are the epochs 1 - n..K.
 
     Attributes:
         num_windows: n, open at once.
+        origin_rows: B; the origin is moved on before each row that is a multiple of B, but the first.
+        moved: C of the row before, about the origin before, for each such row; the first is the unit matrix, (R/B, 15,
+            15).
+        spread: Γ, likewise; the first is zero.
         directions: places of the A directions u among east, north and up, (A,).
         inverse: C⁻¹, (R, 15, 15).
         projected: b = C' u, (R, A, 15).
@@ -49,6 +60,9 @@ class CoastingTables:
     """
 
     num_windows: int
+    origin_rows: int
+    moved: Floats
+    spread: Floats
     directions: Runs
     inverse: Floats
     projected: Floats
@@ -59,34 +73,46 @@ class CoastingTables:
     early: Floats
 
 
-def coasting_tables(model: TightModel, directions: tuple[int, ...], num_windows: int) -> CoastingTables:
+def coasting_tables(
+    model: TightModel, directions: tuple[int, ...], num_windows: int, burn_in: int = 0
+) -> CoastingTables:
     """The tables of a bank.
 
     Args:
-        model: of epochs 0..K.
+        model: of epochs -burn_in..K; those before are as the first of them.
         directions: places of the directions among east, north and up.
         num_windows: n.
+        burn_in: epochs of the model before epoch 0.
     """
     places = np.array(directions, dtype=np.int64)
-    rows = np.maximum(np.arange(1 - num_windows, model.num_epochs + 1), 0)
+    rows = np.maximum(np.arange(1 - num_windows + burn_in, model.num_epochs + 1), 0)
     transition, process_noise = model.separation_transition, model.separation_noise
     backward = np.linalg.inv(transition)
     inverse, noise = np.empty((len(rows), NUM_STATES, NUM_STATES)), np.empty((len(rows), NUM_STATES, NUM_STATES))
     projected = np.empty((len(rows), len(places), NUM_STATES))
     carried, undone, spread = np.eye(NUM_STATES), np.eye(NUM_STATES), np.zeros((NUM_STATES, NUM_STATES))
+    origin_rows = max(num_windows, math.ceil(ORIGIN_LIFE / model.dynamics.interval))
+    moved, spreads = [], []
     for r, k in enumerate(rows):
+        if r % origin_rows == 0:
+            moved.append(carried)
+            spreads.append(spread)
+            carried, undone, spread = np.eye(NUM_STATES), np.eye(NUM_STATES), np.zeros((NUM_STATES, NUM_STATES))
         carried, undone = transition[k] @ carried, undone @ backward[k]
         spread = transition[k] @ spread @ transition[k].T + process_noise[k]
         inverse[r], projected[r], noise[r] = undone, carried[POSITION][places], spread
     gain = model.whitened_gain[:, :, INERTIAL]
     response = inverse @ gain[rows].transpose(0, 2, 1)
     variance = np.zeros((len(rows), len(places), num_windows))
-    _separation_variance(response, projected, variance)
+    _separation_variance(response, projected, origin_rows, np.array(moved), variance)
     position_gain = gain[:, :, POSITION][:, :, places]
     prior = model.covariance[:, POSITION, POSITION][:, places, places]
     filtered = prior - np.add.reduce(position_gain**2, axis=1)
     return CoastingTables(
         num_windows,
+        origin_rows,
+        np.array(moved),
+        np.array(spreads),
         places,
         inverse,
         projected,
@@ -99,19 +125,30 @@ def coasting_tables(model: TightModel, directions: tuple[int, ...], num_windows:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _separation_variance(response: Floats, projected: Floats, variance: Floats) -> None:
+def _separation_variance(
+    response: Floats, projected: Floats, origin_rows: int, moved: Floats, variance: Floats
+) -> None:
     """Σ |U_i' C_i⁻ᵀ b_k|² over the epochs i since a window was opened; variance (R, A, n), overwritten."""
     rows, axes, windows = variance.shape
+    direction, before = np.empty(NUM_STATES), np.empty(NUM_STATES)
     for k in range(rows):
         for a in range(axes):
             total = 0.0
+            direction[:] = projected[k, a]
             for age in range(min(windows, k + 1)):
                 for c in range(response.shape[2]):
                     part = 0.0
                     for i in range(NUM_STATES):
-                        part += response[k - age, i, c] * projected[k, a, i]
+                        part += response[k - age, i, c] * direction[i]
                     total += part * part
                 variance[k, a, age] = total
+                if (k - age) % origin_rows == 0:
+                    # the epochs before have the origin before: C' b
+                    before[:] = 0.0
+                    for i in range(NUM_STATES):
+                        for j in range(NUM_STATES):
+                            before[j] += moved[(k - age) // origin_rows, i, j] * direction[i]
+                    direction[:] = before
 
 
 def _early(response: Floats, num_windows: int) -> Floats:

@@ -29,6 +29,8 @@ class FilterFacts:
         auxiliary_sigma: 1 sigma of what the odometer's solution goes wrong in an epoch at the end of the game, m; None
             = there is no odometer.
         tight_model: burn-in -> the model of the tightly coupled filter, every range used; None = it takes fixes.
+        matched: whether clean innovations before epoch 0 are drawn, white, as of epoch 0; else the filter has really
+            been there.
     """
 
     scenario: str
@@ -39,6 +41,7 @@ class FilterFacts:
     fix_sigma: float | None = None
     auxiliary_sigma: float | None = None
     tight_model: Callable[[int], TightModel] | None = None
+    matched: bool = True
 
     def require(self, owner: str, needs: tuple[str, ...], remedy: str = "") -> None:
         """Refuse a part that needs something the scenario does not offer.

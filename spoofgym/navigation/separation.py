@@ -74,6 +74,8 @@ class CoastingWindows:
         _separate(
             row,
             whitened,
+            tables.origin_rows,
+            tables.moved,
             tables.response,
             tables.projected,
             tables.variance,
@@ -129,6 +131,9 @@ class CoastingWindows:
             gain,
             given,
             backtracked,
+            tables.origin_rows,
+            tables.moved,
+            tables.spread,
             tables.directions,
             tables.inverse,
             tables.projected,
@@ -224,6 +229,8 @@ def _largest(separation: Floats, variance: Floats, limit: float, square: Floats,
 def _separate(
     row: Runs,
     whitened: Floats,
+    origin_rows: int,
+    moved: Floats,
     response: Floats,
     projected: Floats,
     variance: Floats,
@@ -246,6 +253,8 @@ def _separate(
         k = row[run]
         if k < 0:
             continue
+        if k % origin_rows == 0:
+            _move_origin(moved[k // origin_rows], total[run], departure[run])
         slot = _open(run, total[run], departure, alarmed, place, count, age, clean_age)
         for i in range(NUM_STATES):
             for c in range(whitened.shape[1]):
@@ -271,6 +280,9 @@ def _separate_own(
     gain: Floats,
     given: Flags,
     backtracked: Runs,
+    origin_rows: int,
+    moved: Floats,
+    spread: Floats,
     directions: Runs,
     inverse: Floats,
     projected: Floats,
@@ -296,6 +308,9 @@ def _separate_own(
     work = np.empty((NUM_STATES, NUM_STATES))
     for run in range(len(row)):
         k = row[run]
+        if k % origin_rows == 0:
+            _move_origin(moved[k // origin_rows], total[run], departure[run])
+            _move_covariances(moved[k // origin_rows], spread[k // origin_rows], excess[run])
         for i in range(NUM_STATES):
             present[i] = total[run, i]
             for j in range(NUM_STATES):
@@ -312,17 +327,17 @@ def _separate_own(
             _take_back(slot, count[run], first, known[run], departure[run], excess[run], alarmed[run])
         largest = 0.0
         for a in range(len(directions)):
-            moved, gained = 0.0, 0.0
+            pulled, gained = 0.0, 0.0
             if given[run]:
                 for c in range(whitened.shape[1]):
                     part = gain[run, c, directions[a]]
-                    moved += part * whitened[run, c]
+                    pulled += part * whitened[run, c]
                     gained += part * part
             _separations(present, projected[k, a], departure[run], separation)
             _quadratic_forms(projected[k, a], excess[run], slot, weight, variance)
             most = _with_gained(gained, slot, count[run], variance)
             for s in range(n):
-                separation[s] -= moved
+                separation[s] -= pulled
             largest = max(largest, _largest(separation, variance, limit, square, alarmed[run]))
             prior = covariance[run, POSITION + directions[a], POSITION + directions[a]]
             separation_sigma[run, a] = np.sqrt(most + gained)
@@ -345,6 +360,45 @@ def _with_gained(gained: float, slot: int, count: int, variance: Floats) -> floa
         if age < count and coasted > most:
             most = coasted
     return most
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _move_origin(moved: Floats, total: Floats, departure: Floats) -> None:
+    """E <- C E: of the present epoch, (15,), and of all slots, (15, n), in place; moved C (15, 15)."""
+    before, windows = total.copy(), departure.copy()
+    total[:] = 0.0
+    departure[:] = 0.0
+    for i in range(NUM_STATES):
+        for j in range(NUM_STATES):
+            total[i] += moved[i, j] * before[j]
+            for s in range(departure.shape[1]):
+                departure[i, s] += moved[i, j] * windows[j, s]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _move_covariances(moved: Floats, spread: Floats, excess: Floats) -> None:
+    """M <- C M C' + Γ of all slots, packed (120, n), in place; moved C and spread Γ (15, 15)."""
+    covariance, work = np.empty((NUM_STATES, NUM_STATES)), np.empty((NUM_STATES, NUM_STATES))
+    for s in range(excess.shape[1]):
+        place = 0
+        for i in range(NUM_STATES):
+            for j in range(i + 1):
+                covariance[i, j] = excess[place, s]
+                covariance[j, i] = covariance[i, j]
+                place += 1
+        work[:] = 0.0
+        for i in range(NUM_STATES):
+            for c in range(NUM_STATES):
+                for j in range(NUM_STATES):
+                    work[i, j] += moved[i, c] * covariance[c, j]
+        place = 0
+        for i in range(NUM_STATES):
+            for j in range(i + 1):
+                total = spread[i, j]
+                for c in range(NUM_STATES):
+                    total += work[i, c] * moved[j, c]
+                excess[place, s] = total
+                place += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -85,6 +85,18 @@ def test_protection_level_and_recovery_are_those_of_the_bank():
             np.testing.assert_array_equal(getattr(monitor, name), getattr(bank, name))
 
 
+def test_a_calibrated_factor_is_in_the_protection_level_too():
+    """PL = factor T + Q⁻¹(P_MD) σ_coast."""
+    levels = []
+    for factor in (1.0, 2.0, 3.0):
+        monitor = make_detector("kujur-monitor:n=15")
+        monitor.set_threshold(factor)
+        Simulation(FLIGHT, None, [monitor], None, 1, 0).reset()
+        levels.append(monitor.protection_level[0])
+    assert levels[1] - levels[0] == pytest.approx(levels[2] - levels[1], rel=1e-9)
+    assert levels[1] - levels[0] > 0.1
+
+
 @pytest.mark.parametrize(("sigma", "time"), [(0.03, 0.0), (0.3, 20.0)])
 def test_the_shortest_window_misses_as_seldom_as_required(sigma, time):
     """1000 games, 1e-8 each: with n epochs P_MD of 0.2 or less, with one epoch less more than that."""

@@ -7,6 +7,7 @@ from scipy import stats
 
 from spoofgym.detectors import SeparationBank, make_detector
 from spoofgym.detectors.separation_bank import DIRECTIONS
+from spoofgym.navigation import coasting
 from spoofgym.navigation.coasting import coasting_tables
 from spoofgym.navigation.interface import Decision, Demands, Epoch
 from spoofgym.navigation.tight_states import CLOCK, DRIFT, slot_states
@@ -148,6 +149,47 @@ def test_twenty_minutes_after_their_common_origin():
     for mine, expected in follow(SeparationBank(9), flight, always, first=2385, runs=1):
         for one, other in zip(mine, expected, strict=True):
             np.testing.assert_allclose(one, other, rtol=1e-7)
+
+
+@pytest.mark.parametrize("decide", [always, sometimes])
+def test_the_common_origin_moves_on_unseen(decide, monkeypatch):
+    """Every five seconds, three times within the game, with windows that are open across."""
+    monkeypatch.setattr(coasting, "ORIGIN_LIFE", 5.0)
+    tables = coasting_tables(FLIGHT.tight_model(), (2,), 9)
+    assert (tables.origin_rows, len(tables.moved)) == (10, 5)
+    for mine, expected in follow(SeparationBank(9, "horizontal"), FLIGHT, decide):
+        for one, other in zip(mine, expected, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+@pytest.mark.parametrize("direction", ["up", "horizontal"])
+def test_moved_origins_leave_the_tables_as_they_are(direction, monkeypatch):
+    plain = coasting_tables(FLIGHT.tight_model(), DIRECTIONS[direction], 15)
+    monkeypatch.setattr(coasting, "ORIGIN_LIFE", 1.0)
+    moved = coasting_tables(FLIGHT.tight_model(), DIRECTIONS[direction], 15)
+    assert len(moved.moved) > len(plain.moved) == 1
+    np.testing.assert_allclose(moved.variance, plain.variance, rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(moved.filtered, plain.filtered)
+
+
+@pytest.mark.slow
+def test_an_hour_with_a_poor_imu_costs_no_digits():
+    """Own covariances against shared gains; about one origin, rounding would make a thousand metres of the level."""
+    flight = make_scenario("kujur-flight:onset=60,horizon=7200,imu=kujur-automotive")
+    detectors = [SeparationBank(9), SeparationBank(9)]
+    simulations = [
+        Simulation(flight, None, [detector], None, 1, 5, demands=demands)
+        for detector, demands in zip(detectors, (SHARED, OWN), strict=True)
+    ]
+    for simulation in simulations:
+        simulation.reset()
+    for _ in range(7200):
+        for simulation in simulations:
+            simulation.resolve()
+            simulation.observe()
+    one, other = (simulation.epoch.statistics[SeparationBank(9).name][0] for simulation in simulations)
+    assert one == pytest.approx(other, rel=1e-3)
+    assert detectors[0].protection_level[0] == pytest.approx(detectors[1].protection_level[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("direction", ["up", "horizontal"])

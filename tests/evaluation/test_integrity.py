@@ -105,6 +105,14 @@ def test_the_table():
     assert never.text().splitlines()[4] == "continuous              no run begins with the service"
 
 
+def test_alarms_may_be_numbers_or_lists():
+    error, alarm = np.full((2, 3), 2.0 * LIMIT), [[0, 1, 1], [0, 0, 0]]
+    expected = integrity(error, np.ones_like(error), LIMIT, np.array(alarm, dtype=bool))
+    for given in (alarm, np.array(alarm)):
+        result = integrity(error, np.ones_like(error), LIMIT, given)
+        assert (result.failed, result.misled, result.alarmed) == (expected.failed, expected.misled, expected.alarmed)
+
+
 @pytest.mark.parametrize(
     ("error", "alarm", "delay", "message"),
     [

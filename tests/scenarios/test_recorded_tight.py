@@ -133,6 +133,28 @@ def test_the_game_does_not_depend_on_where_its_model_starts(folder: Path) -> Non
     np.testing.assert_allclose(windowed["error"], plain["error"], atol=1e-9)
 
 
+def test_windows_of_separation_know_the_ranges_before_the_game(folder: Path) -> None:
+    """The same epochs as a beginning and in the midst of a longer game: the same windows, up to the noise of Φ."""
+    said = []
+    for onset, horizon in ((ONSET, 20), (ONSET - 30.0, 50)):
+        bank = make_detector("separation-bank:n=15,direction=horizontal")
+        simulation = Simulation(
+            tight(folder, onset=onset, horizon=horizon), None, [bank], None, 1, 0, fidelity="strapdown"
+        )
+        simulation.reset()
+        levels, statistics, times = [], [], []
+        for _ in range(horizon):
+            simulation.resolve()
+            epoch = simulation.observe()
+            times.append(epoch.time[0])
+            levels.append(bank.protection_level[0])
+            statistics.append(epoch.statistics[bank.name][0])
+        said.append((np.array(times)[-20:], np.array(levels)[-20:], np.array(statistics)[-20:]))
+    np.testing.assert_allclose(said[0][0], said[1][0], atol=0.01)
+    np.testing.assert_allclose(said[0][1], said[1][1], rtol=1e-3)
+    np.testing.assert_allclose(said[0][2], said[1][2], atol=5e-3)
+
+
 def test_silence_is_coasted_through_and_satellites_are_known_again(tmp_path: Path) -> None:
     write_drive(tmp_path / "log", silent=(80, 95), turns=5)
     scenario = tight(tmp_path / "log", onset=ONSET)
