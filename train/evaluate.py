@@ -62,7 +62,7 @@ def parser() -> argparse.ArgumentParser:
         "defenders against populations of spoofers; with --matrix, every detector against every attack.",
     )
     add = result.add_argument
-    add("--scenario", default="liu-flight", help="liu-flight, recorded:FOLDER, ... (default: %(default)s)")
+    add("--scenario", default="liu-flight", help="liu-flight, kujur-flight, recorded:DIR, ... (default: %(default)s)")
     add("--detector", action="append",
         help="the monitor; repeat it for several at once (default: snapshot; with --matrix every family)")
     add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")

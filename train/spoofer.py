@@ -45,14 +45,15 @@ def parser() -> argparse.ArgumentParser:
         prog="python -m train.spoofer", description="Train a PPO spoofer against a detector on a real INS/GNSS filter."
     )
     add = result.add_argument
-    add("--scenario", default="liu-flight", help="what is flown (default: %(default)s)")
+    add("--scenario", default="liu-flight", help="what is flown: liu-flight, kujur-flight, ... (default: %(default)s)")
     add("--detector", default="snapshot", help="snapshot, windowed:n=20, ... (default: %(default)s)")
     add("--knowledge", default="shadow", choices=KNOWLEDGE, help="of the victim (default: %(default)s)")
     add("--action", default="rate", choices=ACTIONS, help="what the policy controls (default: %(default)s)")
     add("--frames", type=count, default=1, help="epochs that the policy sees at once (default: %(default)s)")
     add("--shadow", metavar="SPEC", help="scenario whose filter the spoofer takes for the victim's (default: its own)")
     add("--fidelity", default="linear", choices=FIDELITIES, help="of the simulation (default: %(default)s)")
-    add("--steps", type=count, default=DEFAULT_STEPS, help="GNSS epochs to play (default: %(default)s)")
+    add("--steps", type=count, default=DEFAULT_STEPS,
+        help="GNSS epochs to play, rounded up to whole rollouts (default: %(default)s)")
     add("--seed", type=seed_number, default=0, help="of the learner and lane 0 (default: %(default)s)")
     add("--out", type=Path, default=Path("runs/spoofer"), help="run folder (default: %(default)s)")
     add("--threads", type=count, default=1, help="of the learner and the simulation (default: %(default)s)")

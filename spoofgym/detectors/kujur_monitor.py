@@ -26,12 +26,14 @@ class KujurMonitor(Ensemble):
     Args:
         n: epochs: terms of the cumulative innovation, and length and number of the windows of separation.
         direction: ``up``, ``east`` or ``north``.
-        p_fa: probability of a false alarm at an epoch, of both together.
+        p_fa: probability of a false alarm at an epoch, of both together; 1e-5 with nothing given.
         p_md_cpi: required probability of not seeing an attack that has lasted for n epochs.
         p_md_ss: probability that the error is beyond the protection level without an alarm, to one side.
+        arl0: average run length between false alarms, epochs; a factor on both thresholds, and so in PL, is then
+            calibrated.
 
     Raises:
-        ValueError: a value is out of range.
+        ValueError: p_fa and arl0 are both given, or a value is out of range.
     """
 
     kind = "kujur-monitor"
@@ -40,22 +42,26 @@ class KujurMonitor(Ensemble):
         self,
         n: int = DEFAULT_WINDOW,
         direction: str = UP,
-        p_fa: float = DEFAULT_P_FA,
+        p_fa: float | None = None,
         p_md_cpi: float = DEFAULT_P_MD_CPI,
         p_md_ss: float = DEFAULT_P_MD,
+        arl0: float | None = None,
     ) -> None:
+        validation.at_most_one(self.kind, p_fa=p_fa, arl0=arl0)
         self.n = validation.whole(self.kind, "n", n, 1)
         self.direction = validation.one_of(self.kind, "direction", direction, tuple(AXES))
-        self.p_fa = validation.probability(self.kind, "p_fa", p_fa) / 2.0
+        self.p_fa = validation.probability(self.kind, "p_fa", DEFAULT_P_FA if p_fa is None else p_fa) / 2.0
         self.p_md_cpi = validation.probability(self.kind, "p_md_cpi", p_md_cpi)
         validation.probability(self.kind, "p_md_ss", p_md_ss)
         cumulative = Cpi(self.n, self.direction, p_fa=self.p_fa)
-        super().__init__([cumulative, SeparationBank(self.n, self.direction, self.p_fa, p_md_ss)], threshold=1.0)
+        members = [cumulative, SeparationBank(self.n, self.direction, self.p_fa, p_md_ss)]
+        super().__init__(members, 1.0 if arl0 is None else None, arl0)
         self._name = spell(
             self.kind,
             n=None if n == DEFAULT_WINDOW else self.n,
             direction=None if direction == UP else direction,
             p_fa=None if p_fa == DEFAULT_P_FA else p_fa,
+            arl0=arl0,
             p_md_cpi=None if p_md_cpi == DEFAULT_P_MD_CPI else p_md_cpi,
             p_md_ss=None if p_md_ss == DEFAULT_P_MD else p_md_ss,
         )

@@ -7,6 +7,7 @@ the shapes of the manoeuvres are ours.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 from spoofgym import validation
@@ -74,6 +75,8 @@ def liu_flight(
     noise: str = "white",
     coupling: str = "loose",
     drag_off_rate: float | None = None,
+    horizontal_alert_limit: float = Scenario.alert_limits[0],
+    vertical_alert_limit: float = Scenario.alert_limits[1],
 ) -> Scenario:
     """The Liu flight: aviation-grade INS and a single-frequency GPS receiver.
 
@@ -97,6 +100,8 @@ def liu_flight(
             errors of table 1.
         drag_off_rate: largest rate of the spoofed position per axis, and of the spoofed clock, m/s; None = 4 where the
             filter takes fixes, 0.5 where it takes ranges.
+        horizontal_alert_limit: position error from which the navigation is hazardous, m.
+        vertical_alert_limit: m.
 
     Raises:
         ValueError: an unknown name, a number out of range, a game outside the flight, or options that do not go
@@ -108,6 +113,10 @@ def liu_flight(
     validation.above(owner, "sigma", sigma)
     usual = DRAG_OFF_RATES[coupling]
     fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
+    limits = (
+        validation.above(owner, "horizontal_alert_limit", horizontal_alert_limit),
+        validation.above(owner, "vertical_alert_limit", vertical_alert_limit),
+    )
     coloured = markov_sigma != 0.0 or markov_time != 0.0
     name = spell(
         owner,
@@ -121,14 +130,17 @@ def liu_flight(
         noise=None if noise == "white" else noise,
         coupling=None if coupling == "loose" else coupling,
         drag_off_rate=None if fastest == usual else fastest,
+        horizontal_alert_limit=None if limits[0] == Scenario.alert_limits[0] else limits[0],
+        vertical_alert_limit=None if limits[1] == Scenario.alert_limits[1] else limits[1],
     )
     if coupling == "tight":
         if noise != "white" or coloured or sigma != 3.7:
             raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
-        return _tight(name, horizon, onset, rate, imu, fastest)
+        return _tight(name, horizon, onset, rate, imu, fastest, limits)
     if noise == "ranges" and coloured:
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
-    return _loose(name, horizon, onset, rate, imu, fastest, markov_sigma, markov_time, sigma, noise)
+    loose = _loose(name, horizon, onset, rate, imu, fastest, markov_sigma, markov_time, sigma, noise)
+    return loose if limits == loose.alert_limits else replace(loose, alert_limits=limits)
 
 
 def _loose(
@@ -170,7 +182,9 @@ def _loose(
     )
 
 
-def _tight(name: str, horizon: int, onset: float, rate: float, imu: str, fastest: float) -> TightScenario:
+def _tight(
+    name: str, horizon: int, onset: float, rate: float, imu: str, fastest: float, limits: tuple[float, float]
+) -> TightScenario:
     return TightScenario(
         name=name,
         trajectory=_trajectory(),
@@ -186,6 +200,6 @@ def _tight(name: str, horizon: int, onset: float, rate: float, imu: str, fastest
         drag_off_rate=(fastest,) * 3,
         clock_rate=fastest,
         error_scale=10.0,
-        alert_limits=Scenario.alert_limits,
+        alert_limits=limits,
         observable="rate",
     )

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from spoofgym.attacks import make_attack
+from spoofgym.calibration import calibrated
 from spoofgym.detectors import KujurMonitor, make_detector
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
@@ -120,6 +121,22 @@ def test_more_tracking_error_needs_fewer_epochs_and_too_little_more_than_there_a
     assert needed[0] < needed[1] < needed[2] <= 60
     with pytest.raises(ValueError, match="sigma must be a finite number, 0 or more, got -1"):
         monitor.minimum_epochs(model, -1.0, 0.0)
+
+
+def test_an_arl0_is_attained_by_a_factor_on_both():
+    """Calibrated, then 2000 games of noise of their own: Poisson, 6 sigma of 300 and more first alarms."""
+    detector = calibrated(make_detector("kujur-monitor:n=8,arl0=100"), FLIGHT)
+    assert detector.calibrated
+    simulation = Simulation(FLIGHT, None, [detector], None, 2000, 77)
+    simulation.reset()
+    alive, alarms, at_risk = np.ones(2000, dtype=bool), 0, 0
+    for _ in range(FLIGHT.timeline.num_epochs):
+        simulation.resolve()
+        at_risk += int(alive.sum())
+        now = simulation.observe().statistics[detector.name] > detector.threshold
+        alarms += int((now & alive).sum())
+        alive &= ~now
+    assert at_risk / alarms == pytest.approx(100.0, rel=0.05 + 6.0 / np.sqrt(alarms))
 
 
 def test_it_needs_ranges():
