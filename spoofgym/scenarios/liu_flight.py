@@ -43,7 +43,7 @@ LIU_MANOEUVRES = (
 )
 """Turns begin at 150, 330, 480 and 680 s; from 770 s straight and level, north at 150 m/s."""
 
-DRAG_OFF_RATES = {"loose": 4.0, "tight": 0.5}
+DRAG_OFF_RATES = {"loose": 4.0, "tight": 0.25}
 """Largest rate of a spoofed position, m/s per axis, by coupling; ours. A range rate, good to 5 cm/s, shows at once what
 a fix hides."""
 NOISES = ("white", "ranges")
@@ -99,7 +99,7 @@ def liu_flight(
         coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of every range itself, with the
             errors of table 1.
         drag_off_rate: largest rate of the spoofed position per axis, and of the spoofed clock, m/s; None = 4 where the
-            filter takes fixes, 0.5 where it takes ranges.
+            filter takes fixes, 0.25 where it takes ranges.
         horizontal_alert_limit: position error from which the navigation is hazardous, m.
         vertical_alert_limit: m.
 

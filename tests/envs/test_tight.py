@@ -93,7 +93,7 @@ def test_four_rates_move_position_and_clock() -> None:
     np.testing.assert_allclose(env.game.offset[0], [1.0, -0.5, 0.2, 0.0], atol=1e-12)
     assert env.game.simulation.clock_offset[0] == env.game.offset[0, 3]
     assert info["clock_error"] == pytest.approx(env.game.clock_error[0])
-    for scenario, rate in ((KUJUR, 0.25), (LIU, 0.5), (KUJUR + ",drag_off_rate=4", 4.0)):
+    for scenario, rate in ((KUJUR, 0.25), (LIU, 0.25), (KUJUR + ",drag_off_rate=4", 4.0)):
         rates = make_scenario(scenario)
         assert (rates.drag_off_rate, rates.clock_rate) == ((rate, rate, rate), rate)
     with pytest.raises(ValueError, match="drag_off_rate must be a finite number greater than 0, got 0"):
