@@ -33,9 +33,9 @@ class DefenderEnv(SingleEnv):
     does. `relative-motion`, one of the default detectors, needs an inertial solution, which the robot has not: name
     others.
 
-    With `coupling="tight"` (`kujur-flight`, which is tight by itself, and `liu-flight`) the filter takes the ranges to
-    the satellites instead of fixes, and the defender may leave out single satellites. With fewer than four the filter
-    still uses what is left, and coasts in the directions that nothing observes.
+    With `coupling="tight"` (`kujur-flight`, which is tight by itself, `liu-flight`, and logs of ranges) the filter
+    takes the ranges to the satellites instead of fixes, and the defender may leave out single satellites. With fewer
+    than four the filter still uses what is left, and coasts in the directions that nothing observes.
 
     ```python
     import gymnasium

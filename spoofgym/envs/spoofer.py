@@ -28,10 +28,10 @@ class SpooferEnv(SingleEnv):
     On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
     fixes (`docs/robot.md`). The robot knows its height, and only the horizontal error counts, there as everywhere.
 
-    With `coupling="tight"` (`kujur-flight`, which is tight by itself, and `liu-flight`) the filter takes the ranges to
-    the satellites instead of fixes: code and carrier, or code and range rate. The spoofer then moves all ranges as a
-    receiver at the offset would see them, and pulls the receiver's clock as well. Only the horizontal error is scored
-    there, too: what becomes of the clock earns nothing, and a clock that jumps is seen.
+    With `coupling="tight"` (`kujur-flight`, which is tight by itself, `liu-flight`, and logs of ranges) the filter
+    takes the ranges to the satellites instead of fixes: code and carrier, or code and range rate. The spoofer then
+    moves all ranges as a receiver at the offset would see them, and pulls the receiver's clock as well. Only the
+    horizontal error is scored there, too: what becomes of the clock earns nothing, and a clock that jumps is seen.
 
     ```python
     import gymnasium
