@@ -13,6 +13,14 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.navigation.coasting import PACKED, CoastingTables
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.tight_filter import POSITION
+from spoofgym.navigation.window_covariances import (
+    bring_back,
+    fill_early,
+    move_covariances,
+    quadratic_forms,
+    take_back,
+    with_gained,
+)
 
 
 class CoastingWindows:
@@ -310,21 +318,21 @@ def _separate_own(
         k = row[run]
         if k % origin_rows == 0:
             _move_origin(moved[k // origin_rows], total[run], departure[run])
-            _move_covariances(moved[k // origin_rows], spread[k // origin_rows], excess[run])
+            move_covariances(moved[k // origin_rows], spread[k // origin_rows], excess[run])
         for i in range(NUM_STATES):
             present[i] = total[run, i]
             for j in range(NUM_STATES):
                 present[i] -= inverse[k, i, j] * auxiliary[run, j]
         slot = _open(run, present, departure, alarmed, place, count, age, clean_age)
         known[run, slot] = k - 1
-        _bring_back(covariance[run], noise[k], inverse[k], work, beyond)
+        bring_back(covariance[run], noise[k], inverse[k], work, beyond)
         for p in range(PACKED):
             excess[run, p, slot] = beyond[p]
         if k == n - 1:
-            _fill_early(slot, count[run], early, excess[run])
+            fill_early(slot, count[run], early, excess[run])
         if backtracked[run] > 0:
             first = k - 1 - backtracked[run]
-            _take_back(slot, count[run], first, known[run], departure[run], excess[run], alarmed[run])
+            take_back(slot, count[run], first, known[run], departure[run], excess[run], alarmed[run])
         largest = 0.0
         for a in range(len(directions)):
             pulled, gained = 0.0, 0.0
@@ -334,8 +342,8 @@ def _separate_own(
                     pulled += part * whitened[run, c]
                     gained += part * part
             _separations(present, projected[k, a], departure[run], separation)
-            _quadratic_forms(projected[k, a], excess[run], slot, weight, variance)
-            most = _with_gained(gained, slot, count[run], variance)
+            quadratic_forms(projected[k, a], excess[run], slot, weight, variance)
+            most = with_gained(gained, slot, count[run], variance)
             for s in range(n):
                 separation[s] -= pulled
             largest = max(largest, _largest(separation, variance, limit, square, alarmed[run]))
@@ -344,22 +352,6 @@ def _separate_own(
             coasting_sigma[run, a] = np.sqrt(prior + most)
         ratio[run] = np.sqrt(largest)
         _close(run, alarmed, place, count, clean_age)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _with_gained(gained: float, slot: int, count: int, variance: Floats) -> float:
-    """Add what the present ranges tell to the variance of every open window, (n,); the largest without it.
-
-    Slots without a window have none. Rounding must not make a variance negative.
-    """
-    n, most = variance.shape[0], 0.0
-    for s in range(n):
-        age = slot - s if s <= slot else slot - s + n
-        coasted = max(variance[s], 0.0)
-        variance[s] = coasted + gained if age < count else 0.0
-        if age < count and coasted > most:
-            most = coasted
-    return most
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -373,101 +365,3 @@ def _move_origin(moved: Floats, total: Floats, departure: Floats) -> None:
             total[i] += moved[i, j] * before[j]
             for s in range(departure.shape[1]):
                 departure[i, s] += moved[i, j] * windows[j, s]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _move_covariances(moved: Floats, spread: Floats, excess: Floats) -> None:
-    """M <- C M C' + Γ of all slots, packed (120, n), in place; moved C and spread Γ (15, 15)."""
-    covariance, work = np.empty((NUM_STATES, NUM_STATES)), np.empty((NUM_STATES, NUM_STATES))
-    for s in range(excess.shape[1]):
-        place = 0
-        for i in range(NUM_STATES):
-            for j in range(i + 1):
-                covariance[i, j] = excess[place, s]
-                covariance[j, i] = covariance[i, j]
-                place += 1
-        work[:] = 0.0
-        for i in range(NUM_STATES):
-            for c in range(NUM_STATES):
-                for j in range(NUM_STATES):
-                    work[i, j] += moved[i, c] * covariance[c, j]
-        place = 0
-        for i in range(NUM_STATES):
-            for j in range(i + 1):
-                total = spread[i, j]
-                for c in range(NUM_STATES):
-                    total += work[i, c] * moved[j, c]
-                excess[place, s] = total
-                place += 1
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _bring_back(covariance: Floats, noise: Floats, inverse: Floats, work: Floats, packed: Floats) -> None:
-    """C⁻¹ (P - Γ) C⁻ᵀ, its lower triangle by rows, (120,); the others (15, 15)."""
-    for i in range(NUM_STATES):
-        for j in range(NUM_STATES):
-            work[i, j] = 0.0
-        for c in range(NUM_STATES):
-            factor = inverse[i, c]
-            if factor != 0.0:
-                for j in range(NUM_STATES):
-                    work[i, j] += factor * (covariance[c, j] - noise[c, j])
-    place = 0
-    for i in range(NUM_STATES):
-        for j in range(i + 1):
-            total = 0.0
-            for c in range(NUM_STATES):
-                total += work[i, c] * inverse[j, c]
-            packed[place] = total
-            place += 1
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _fill_early(slot: int, count: int, early: Floats, excess: Floats) -> None:
-    """M of the windows opened before epoch 0, at which the newest stands in ``slot``; excess (120, n)."""
-    for p in range(PACKED):
-        for age in range(1, count):
-            excess[p, slot - age] = excess[p, slot] + early[p, age]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _take_back(
-    slot: int, count: int, first: int, known: Runs, departure: Floats, excess: Floats, alarmed: Flags
-) -> None:
-    """The filter has given back the ranges from row ``first`` up to the last but one: so do the windows that know some.
-
-    They are then as the youngest that knows none of them; where that one has closed they are as the newest, in
-    ``slot``. The last row that each knows is in ``known``, (n,).
-    """
-    source = slot
-    for age in range(count - 1, 0, -1):
-        if known[slot - age] < first:
-            source = slot - age
-    for age in range(1, count):
-        if first <= known[slot - age] < known[slot]:
-            known[slot - age] = known[source]
-            alarmed[slot - age] = alarmed[source]
-            for i in range(NUM_STATES):
-                departure[i, slot - age] = departure[i, source]
-            for p in range(PACKED):
-                excess[p, slot - age] = excess[p, source]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _quadratic_forms(direction: Floats, excess: Floats, slot: int, weight: Floats, variance: Floats) -> None:
-    """b' (M_j - M_k) b of all slots j, (n,), of which k is one; direction b (15,), excess (120, n), weight (120,)."""
-    place = 0
-    for i in range(NUM_STATES):
-        for j in range(i + 1):
-            weight[place] = direction[i] * direction[j] * (1.0 if i == j else 2.0)
-            place += 1
-    base = 0.0
-    for p in range(PACKED):
-        base += weight[p] * excess[p, slot]
-    for s in range(variance.shape[0]):
-        variance[s] = -base
-    for p in range(0, PACKED, 4):
-        w0, w1, w2, w3 = weight[p], weight[p + 1], weight[p + 2], weight[p + 3]
-        m0, m1, m2, m3 = excess[p], excess[p + 1], excess[p + 2], excess[p + 3]
-        for s in range(variance.shape[0]):
-            variance[s] += w0 * m0[s] + w1 * m1[s] + w2 * m2[s] + w3 * m3[s]
