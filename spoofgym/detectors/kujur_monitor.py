@@ -8,6 +8,7 @@ from spoofgym.detectors import cpi_theory
 from spoofgym.detectors.cpi import AXES, UP, Cpi, unit_vector
 from spoofgym.detectors.ensemble import Ensemble
 from spoofgym.detectors.separation_bank import DEFAULT_P_FA, DEFAULT_P_MD, DEFAULT_WINDOW, SeparationBank
+from spoofgym.navigation.interface import Epoch
 from spoofgym.navigation.tight_model import TightModel
 from spoofgym.navigation.tracking_response import projected_response
 from spoofgym.specification import spell
@@ -66,16 +67,10 @@ class KujurMonitor(Ensemble):
             p_md_ss=None if p_md_ss == DEFAULT_P_MD else p_md_ss,
         )
 
-    def set_threshold(
-        self,
-        threshold: float,
-        arl0: float | None = None,
-        interval: tuple[float, float] | None = None,
-        origin: object = None,
-    ) -> None:
-        """Take a factor on both thresholds from calibration, which the protection level then has, too."""
-        super().set_threshold(threshold, arl0, interval, origin)
-        self.bank.scale = threshold
+    def update(self, epoch: Epoch) -> Floats:
+        """The larger of both over its threshold, (N,); the protection level takes the calibrated factor over."""
+        self.bank.scale = 1.0 if self.threshold is None else self.threshold
+        return super().update(epoch)
 
     @property
     def bank(self) -> SeparationBank:

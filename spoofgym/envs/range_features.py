@@ -8,6 +8,7 @@ detector with a ``protection_level``, a bank of coasting solutions, holds whatev
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -24,9 +25,18 @@ BEYOND = 1e6
 """Protection levels over their alert limits count as at most this: an infinite one has no squashed form."""
 
 
+@runtime_checkable
+class Bounding(Protocol):
+    """A detector that bounds the position error."""
+
+    @property
+    def protection_level(self) -> Floats:
+        """PL after the present epoch, (N,), m."""
+
+
 def bounding_detectors(simulation: Simulation, names: Sequence[str]) -> tuple[str, ...]:
     """Those of the detectors that give a protection level, in order."""
-    return tuple(name for name in names if hasattr(simulation.detectors[name], "protection_level"))
+    return tuple(name for name in names if isinstance(simulation.detectors[name], Bounding))
 
 
 def satellites_in_view(simulation: Simulation) -> Flags:
@@ -69,7 +79,8 @@ class RangeFeatures:
         self.fields = range_fields(scenario.slots, bounding)
         self._simulation, self._slots = simulation, scenario.slots
         self._horizontal, self._vertical = scenario.alert_limits
-        self._bounding = [(simulation.detectors[name], self._limit(name)) for name in bounding]
+        levels = ((simulation.detectors[name], self._limit(name)) for name in bounding)
+        self._bounding = [(detector, limit) for detector, limit in levels if isinstance(detector, Bounding)]
 
     def _limit(self, detector: str) -> float:
         """The alert limit of a detector's protection level, m: by the axes that it tests, up unless it says others."""
@@ -99,4 +110,4 @@ class RangeFeatures:
         )
 
     def _detectors_levels(self) -> list[Floats]:
-        return [detector.protection_level / limit for detector, limit in self._bounding]  # type: ignore[attr-defined]
+        return [detector.protection_level / limit for detector, limit in self._bounding]
