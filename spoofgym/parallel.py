@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
@@ -38,12 +38,15 @@ class RunSlices:
         self.__init__(**state)  # type: ignore[misc]
 
     def call(self, function: Callable[[Runs], object], runs: Runs, grain: int) -> None:
-        """Run ``function`` on slices of ``runs``.
+        """Run ``function`` on slices of ``runs``; return, or raise, when every slice has come to its end.
 
         Args:
             function: takes the slice's runs, writes its results in place.
             runs: indices, (n,).
             grain: runs below which a slice is not worth a thread.
+
+        Raises:
+            Exception: what ``function`` raised, of the first slice that did.
         """
         slices = min(self.threads, max(1, len(runs) // grain))
         if slices == 1:
@@ -53,6 +56,9 @@ class RunSlices:
             self._pool, self._process = ThreadPoolExecutor(self.threads - 1), os.getpid()
         first, *others = np.array_split(runs, slices)
         futures = [self._pool.submit(function, part) for part in others]
-        function(first)
+        try:
+            function(first)
+        finally:
+            wait(futures)  # a slice that still writes would spoil what the caller does after an error
         for future in futures:
             future.result()
