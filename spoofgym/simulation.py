@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector, seen, seen_dimension
+from spoofgym.navigation.divergence import diverged_error
 from spoofgym.navigation.facts import LINEAR_MODEL, RANGES
 from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
 from spoofgym.parallel import RunSlices
@@ -20,6 +22,7 @@ from spoofgym.scenario import Scenario
 from spoofgym.sensors.confounders import Confounders
 from spoofgym.streams import RunStreams
 
+ON_DIVERGENCE = ("raise", "hold")
 MAX_REDRAWS = 100
 NO_DEMANDS = Demands()
 
@@ -52,6 +55,7 @@ class Simulation:
         threads: int = 1,
         demands: Demands = NO_DEMANDS,
         confounders: Confounders | None = None,
+        on_divergence: str = "raise",
     ) -> None:
         """Set up ``num_runs`` runs seeded ``seed + i``.
 
@@ -66,6 +70,8 @@ class Simulation:
             threads: for slices of runs.
             demands: of a defender outside, beside those of detectors and response.
             confounders: outages and multipath; None = there are none.
+            on_divergence: "raise": a run whose filter diverges ends the simulation with an error; "hold": it is held
+                at its last valid solution, and ``navigator.diverged`` tells, for a caller that ends its game.
 
         Raises:
             ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the
@@ -74,6 +80,7 @@ class Simulation:
         if num_runs < 1:
             raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
         scenario.check_fidelity(fidelity)
+        self._holds = validation.one_of("simulation", "on_divergence", on_divergence, ON_DIVERGENCE) == "hold"
         self.scenario = scenario
         self.fidelity = fidelity
         self.num_runs = num_runs
@@ -286,6 +293,9 @@ class Simulation:
             decision: of a defender outside, for these runs; None = the response's, or to use every fix where there is
                 none.
             runs: which.
+
+        Raises:
+            FilterDivergedError: the filter of a run has diverged, and the simulation does not hold it.
         """
         if decision is None:
             decision = self.decision if runs is None else self.decision.of(runs)
@@ -294,6 +304,19 @@ class Simulation:
             decision = replace(decision, use=decision.use & (available if runs is None else available[runs]))
         self.used[self._all if runs is None else runs] = decision.use
         self.navigator.resolve(decision, runs)
+        if not self._holds:
+            self.require_converged()
+
+    def require_converged(self) -> None:
+        """Refuse to go on where the filter of a run has diverged.
+
+        Raises:
+            FilterDivergedError: naming the first such run.
+        """
+        diverged = self.navigator.diverged
+        if diverged.any():
+            run = int(diverged.argmax())
+            raise diverged_error(run, float(self._times[self.navigator.index[run]]))
 
     def observe(self, offset: Floats | None = None) -> Epoch:
         """First half of the next epoch of every run: propagate, measure, form the innovation and the statistics.
@@ -304,6 +327,7 @@ class Simulation:
 
         Raises:
             RuntimeError: a run has no epoch left.
+            FilterDivergedError: the filter of a run has diverged, and the simulation does not hold it.
         """
         navigator = self.navigator
         if navigator.index.max() + 1 >= len(self._times):
@@ -317,6 +341,8 @@ class Simulation:
         self.offset, self.clock_offset = spoof.offset, spoof.clock
         navigator.propagate()
         innovation = navigator.innovate(deviation)
+        if not self._holds:
+            self.require_converged()
         available = self._available(clock.index, innovation)
         epoch = Epoch(clock.index, clock.time, innovation, available=available, view=self._view(self._all))
         self.alarm = self._test(epoch, self.detectors)

@@ -41,6 +41,7 @@ class Outcome:
         used: whether the fix was used, (N,).
         left_out: satellites in view that were left out of a fix that was used, (N,).
         ignored: choices to leave a satellite out in an empty slot, (N,).
+        diverged: whether the filter has diverged, (N,).
         terminated: the game is over, (N,).
     """
 
@@ -51,6 +52,7 @@ class Outcome:
     used: Flags
     left_out: Runs
     ignored: Runs
+    diverged: Flags
     terminated: Flags
 
     @property
@@ -119,6 +121,7 @@ class DefenderGame:
             threads=config.threads,
             demands=Demands(excludes=True, history=max(scenario.history, int(self.depths.max()))),
             confounders=self.confounders,
+            on_divergence="hold",
         )
         self.features = DefenderFeatures(scenario, self.simulation, names, num_lanes)
         self.privileged = PrivilegedState(self.simulation, self.attacks, self.confounders, scenario.defender_scale)
@@ -193,8 +196,13 @@ class DefenderGame:
         if restarting is not None and len(restarting):
             self._begin(restarting)
         self.features.update(self.excluding, self.coast, self._all)
-        over = self.index == self._horizon
-        return Outcome(error, exclusion, asked, taken_back, used, left_out, ignored, over)
+        diverged = simulation.navigator.diverged.copy()
+        if diverged.any():
+            left = np.where(diverged, self._horizon - self.index, 0)
+            self._total_error += left * self.error
+            error = np.where(diverged, -self.config.error_clip * (left + 1), error)
+        over = diverged | (self.index == self._horizon)
+        return Outcome(error, exclusion, asked, taken_back, used, left_out, ignored, diverged, over)
 
     def _check(self, actions: NDArray[Any]) -> Runs:
         given, most = np.asarray(actions), self.action_space.nvec
@@ -269,4 +277,5 @@ class DefenderGame:
 
     def end_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos of games that are over."""
-        return {"mean_error": self._total_error / self._horizon}
+        words = np.where(outcome.diverged, "diverged", "finished").astype(object)
+        return {"mean_error": self._total_error / self._horizon, "outcome": words}

@@ -39,9 +39,10 @@ class Outcome:
 
     Attributes:
         growth: reward for the growth of the error, (N,).
-        forfeit: what an alarm takes back, (N,).
+        forfeit: what an alarm, or a filter that diverges, takes back, (N,).
         alarm: whether a detector alarmed in this epoch of the game, (N,).
         alarmed: whether one has alarmed since the game began, (N,).
+        diverged: whether the victim's filter has diverged, (N,).
         terminated: the game is over, (N,).
     """
 
@@ -49,6 +50,7 @@ class Outcome:
     forfeit: Floats
     alarm: Flags
     alarmed: Flags
+    diverged: Flags
     terminated: Flags
 
     @property
@@ -94,7 +96,14 @@ class SpooferGame:
         if config.on_alarm == "end":
             response = None
         self.simulation = Simulation(
-            scenario, None, detectors, response, num_lanes, fidelity=config.fidelity, threads=config.threads
+            scenario,
+            None,
+            detectors,
+            response,
+            num_lanes,
+            fidelity=config.fidelity,
+            threads=config.threads,
+            on_divergence="hold",
         )
         self.scenario = scenario
         self.num_lanes = num_lanes
@@ -226,17 +235,20 @@ class SpooferGame:
         alarm = self.simulation.alarm & (index > 0)
         self._alarmed = self._alarmed | alarm
         caught = alarm if self.config.on_alarm == "end" else self._nobody
-        last = (index == self._horizon) & ~caught
+        diverged = self.simulation.navigator.diverged
+        last = (index == self._horizon) & ~caught & ~diverged
         if last.any():
             lanes = np.flatnonzero(last)
             self.simulation.resolve(runs=lanes)
             error[lanes] = self._horizontal()[lanes]
             self._read_clock(lanes)
         scale = self.scenario.error_scale
+        diverged = diverged.copy()  # the last fix of a game, too, can make its filter diverge
+        lost = caught | diverged if self.config.on_alarm == "end" else self._nobody
         growth = (error - self.error) / scale
-        forfeit = np.where(caught, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
+        forfeit = np.where(lost, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
         self.error = error
-        return Outcome(growth, forfeit, alarm, self._alarmed, caught | last)
+        return Outcome(growth, forfeit, alarm, self._alarmed, diverged, caught | last | diverged)
 
     def observation(self) -> NDArray[np.float32]:
         """What each lane's spoofer sees, (N, frames * D)."""
@@ -291,4 +303,5 @@ class SpooferGame:
     def end_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos of games that are over."""
         words = np.where(outcome.alarmed, "detected", "undetected").astype(object)
-        return {"outcome": words, "is_success": ~outcome.alarmed}
+        words[outcome.diverged] = "diverged"
+        return {"outcome": words, "is_success": ~outcome.alarmed & ~outcome.diverged}

@@ -241,6 +241,7 @@ def play_policy(
             actions = act(game.observation())
             record.excluded[:, k] = actions[:, 0] == EXCLUDE
             game.step(actions)
+            game.simulation.require_converged()
             record.error[:, k] = game.error
         parts.append(record.episodes(game.simulation))
     return _join(parts)

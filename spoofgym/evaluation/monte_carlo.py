@@ -127,6 +127,7 @@ def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch
     begun, onset_epoch = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64)
     for epoch in range(1, simulation.scenario.timeline.num_epochs + 1):
         advance()
+        simulation.require_converged()
         begins = ~begun & simulation.attacked
         if begins.any():
             onset_epoch[begins] = epoch - 1

@@ -204,7 +204,7 @@ def _play(
     onset = scenario.timeline.start if attack.onset is None else attack.onset
     spoofing = not isinstance(attack, NoAttack)
     detection: tuple[float, float] | None = None
-    largest = 0.0
+    largest = np.float64(0.0)
     simulation.reset()
     simulation.resolve()
     for alarmed in false:
@@ -214,10 +214,10 @@ def _play(
             detection = time - onset, float(horizontal(simulation.error)[0])
         simulation.resolve()
         if after:
-            largest = max(largest, float(horizontal(simulation.error)[0]))
+            largest = np.maximum(largest, horizontal(simulation.error)[0])
     return {
         "detected": detection is not None,
         "time_to_detect_s": None if detection is None else detection[0],
         "error_at_detection_m": None if detection is None else detection[1],
-        "max_error_m": largest,
+        "max_error_m": float(largest),
     }

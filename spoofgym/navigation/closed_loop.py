@@ -9,7 +9,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import enu_difference, enu_displacement
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
-from spoofgym.navigation.mechanization import mechanize
+from spoofgym.navigation.mechanization import load_matrix, mechanize, product, rotation, transpose
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
 
 # rows of the state kept when a fix is taken
@@ -338,25 +338,26 @@ def reset(
 
 @njit(cache=True, nogil=True)
 def rotate(attitude: Floats, x: float, y: float, z: float) -> None:
-    """C <- (I + [θ x]) C, made orthonormal again by three steps of C <- C (3 I - C'C) / 2; in place."""
-    for j in range(3):
-        a, b, c = attitude[0, j], attitude[1, j], attitude[2, j]
-        attitude[0, j] = a - z * b + y * c
-        attitude[1, j] = b + z * a - x * c
-        attitude[2, j] = c - y * a + x * b
-    product, result = np.empty((3, 3)), np.empty((3, 3))
-    for _ in range(3):
-        for i in range(3):
-            for j in range(3):
-                total = 0.0
-                for k in range(3):
-                    total += attitude[k, i] * attitude[k, j]
-                product[i, j] = -total
-            product[i, i] += 3.0
-        for i in range(3):
-            for j in range(3):
-                total = 0.0
-                for k in range(3):
-                    total += attitude[i, k] * product[k, j]
-                result[i, j] = 0.5 * total
-        attitude[:, :] = result
+    """C <- Exp([θ x]) C by a rotation vector θ of any length, rad; C (3, 3) in place.
+
+    The turn is exact (Rodrigues). One step of C <- C (3 I - C'C) / 2 takes away the rounding of all turns before it.
+    """
+    turned = product(rotation(x, y, z), load_matrix(attitude))
+    square = product(transpose(turned), turned)
+    turned = product(
+        turned,
+        (
+            1.5 - 0.5 * square[0],
+            -0.5 * square[1],
+            -0.5 * square[2],
+            -0.5 * square[3],
+            1.5 - 0.5 * square[4],
+            -0.5 * square[5],
+            -0.5 * square[6],
+            -0.5 * square[7],
+            1.5 - 0.5 * square[8],
+        ),
+    )
+    for i in range(3):
+        for j in range(3):
+            attitude[i, j] = turned[3 * i + j]

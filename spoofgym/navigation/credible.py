@@ -92,6 +92,7 @@ class CredibleNavigator:
         credit: fixes used in a row, (N,), as far as the rule counts them.
         displacement: what the odometer gives for each step of the episode, (N, J, 2), m.
         index: the epoch where each run stands, (N,); -1 before the first.
+        diverged: whether the filter has diverged, (N,); a linear one never does.
         backtracked: epochs that the last `resolve` took back, (N,).
         history: epochs that can be taken back.
     """
@@ -113,6 +114,7 @@ class CredibleNavigator:
         self.credit = np.zeros(num_runs, dtype=np.int64)
         self.displacement = np.zeros((num_runs, model.motion.num_steps, 2))
         self.index = np.full(num_runs, -1)
+        self.diverged = np.zeros(num_runs, dtype=bool)  # a linear filter never does
         self.backtracked = np.zeros(num_runs, dtype=np.int64)
         self.history = demands.history
         self._past = np.zeros((num_runs, demands.history + 1 if demands.history else 0, NUM_KEPT))

@@ -268,6 +268,8 @@ class Navigator(Protocol):
     """
 
     index: Runs
+    diverged: Flags
+    """Whether the filter has diverged since the episode began, (N,): it is then held at its last valid solution."""
     backtracked: Runs
     """Epochs that the last `resolve` took back, (N,): the depth decided, cut at what the history holds."""
 

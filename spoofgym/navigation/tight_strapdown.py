@@ -12,6 +12,7 @@ from numba import njit
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, ecef, geodetic_to_ecef
 from spoofgym.navigation import closed_loop, kalman, tight_filter
+from spoofgym.navigation.divergence import blank
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.navigation.linear import NO_DEMANDS
@@ -67,13 +68,22 @@ class TightStrapdownNavigator(StrapdownNavigator):
         self.state = np.zeros((num_runs, n))
         self.range_normals = np.zeros((num_runs, tight.num_epochs + 1, n))
         self.covariance = np.zeros((num_runs, n, n))
+        self._prior_covariance = tight.prior_covariance
         self._gain = np.zeros((num_runs, m, n))
         self._whitened = np.zeros((num_runs, m))
         self._deviation = np.zeros((num_runs, m))
         self._response = np.zeros((num_runs, m, 3))
         self._every_satellite = np.ones((num_runs, tight.dynamics.num_slots), dtype=bool)
-        # the truth has no history: only the filter goes back
-        self._resolved = (self.attitude, self.velocity, self.position, self.bias, self.state, self.covariance)
+        # the true bias goes back, too: the stored noise then carries it forward to the same bits
+        self._resolved = (
+            self.attitude,
+            self.velocity,
+            self.position,
+            self.bias,
+            self.true_bias,
+            self.state,
+            self.covariance,
+        )
         self._past = tuple(np.zeros((num_runs, slots, *part.shape[1:])) for part in self._resolved)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
@@ -96,17 +106,15 @@ class TightStrapdownNavigator(StrapdownNavigator):
             stream = streams(run, "imu")
             stream.standard_normal(out=self.range_normals[run])
             self._generators[run] = stream.spawn(1)[0]
+        self.diverged[runs] = False
+        self._hold(runs)
+
+    def _hold(self, runs: Runs) -> None:
+        super()._hold(runs)
+        if self.diverged.any():  # what a diverged filter believes of clock and atmosphere may not be finite
+            self.state[self.diverged] = 0.0
 
     def _mechanize(self, runs: Runs, auxiliary: Floats) -> None:
-        self._carry(runs, auxiliary, self.true_bias)
-
-    def _backtrack_slice(self, runs: Runs) -> None:
-        truth = self.true_bias
-        self.true_bias = truth.copy()
-        super()._backtrack_slice(runs)
-        self.true_bias = truth
-
-    def _carry(self, runs: Runs, auxiliary: Floats, true_bias: Floats) -> None:
         model, dynamics = self.model, self.tight.dynamics
         _propagate(
             runs,
@@ -115,7 +123,7 @@ class TightStrapdownNavigator(StrapdownNavigator):
             self.velocity,
             self.position,
             self.bias,
-            true_bias,
+            self.true_bias,
             self.state,
             self.covariance,
             self._fix,
@@ -182,6 +190,10 @@ class TightStrapdownNavigator(StrapdownNavigator):
             self._all[: len(runs)],
             GRAIN,
         )
+        lost = self._lost(runs, nis)
+        if len(lost):
+            blank(lost, residual, covariance, whitened, nis)
+            response[lost] = 0.0
         self._whitened[runs], self._response[runs] = whitened, response
         present = np.tile(at_epochs(dynamics.present, self.index[runs]) & satellites, (1, 2))
         return Innovation(residual, covariance, whitened, nis, response, present)
@@ -205,6 +217,7 @@ class TightStrapdownNavigator(StrapdownNavigator):
             self._reset_to_fix(runs[jumps], decision.reset[jumps])
             used = used & ~jumps
         self._correct(runs[used])
+        self._hold(runs)
         if before is not None:
             self._move_auxiliary(runs, before)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spoofgym.arrays import Floats
+from spoofgym.navigation.divergence import diverged_error
 from spoofgym.navigation.interface import Decision
 from spoofgym.navigation.loose import StrapdownNavigator
 from spoofgym.navigation.strapdown_model import StrapdownModel
@@ -50,7 +51,11 @@ class TightCleanRun(CleanRun):
 
 
 def clean_run(model: StrapdownModel) -> CleanRun:
-    """Run the filter over all epochs of a model, every fix used."""
+    """Run the filter over all epochs of a model, every fix used.
+
+    Raises:
+        FilterDivergedError: the filter diverges.
+    """
     navigator = StrapdownNavigator(model, 1, RunSlices(1))
     return CleanRun(*_states(navigator, np.zeros(NUM_JOINT), np.zeros((len(model.time), model.dimension))))
 
@@ -61,6 +66,9 @@ def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> Ti
     Args:
         navigator: of the log.
         deviation: of the ranges from those of its reference, (E, m), m and m/s.
+
+    Raises:
+        FilterDivergedError: the filter diverges.
     """
     state = navigator.state
     parts = _states(navigator, np.zeros(state.shape[1] + NUM_BIASES), deviation, lambda: state)
@@ -70,7 +78,11 @@ def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> Ti
 def _states(
     navigator: StrapdownNavigator, initial: Floats, deviation: Floats, *more: Callable[[], Floats]
 ) -> list[Floats]:
-    """Attitude, velocity, position, bias, P, and more, before the first epoch and after each, (E + 1, ...)."""
+    """Attitude, velocity, position, bias, P, and more, before the first epoch and after each, (E + 1, ...).
+
+    Raises:
+        FilterDivergedError: the filter diverges.
+    """
     navigator.reset(np.array([0]), initial[None], RunStreams.from_seed(0, 1))
     use = Decision(np.ones(1, dtype=bool))
     states: list[list[Floats]] = []
@@ -85,5 +97,7 @@ def _states(
         navigator.propagate()
         navigator.innovate(measured[None])
         navigator.resolve(use)
+        if navigator.diverged[0]:
+            raise diverged_error(0, float(navigator.model.time[navigator.index[0]]))
         keep()
     return [np.stack(part) for part in zip(*states, strict=True)]

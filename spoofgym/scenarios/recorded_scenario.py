@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,6 +12,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.geodesy import position_difference
+from spoofgym.navigation.divergence import FilterDivergedError
 from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.strapdown_model import StrapdownModel
@@ -219,16 +222,19 @@ class RecordedScenario(Scenario):
             prior_covariance=clean.covariance[first],
         )
 
-    def _check_clean(self, run: CleanRun) -> None:
-        """Refuse a clean run that went astray.
+    @contextmanager
+    def _refusing_divergence(self) -> Iterator[None]:
+        """Refuse the log where the clean run made in this block diverges.
 
         Raises:
-            ValueError: its position is not finite.
+            ValueError: it does; the message says when.
         """
-        if not np.all(np.isfinite(run.position)):
+        try:
+            yield
+        except FilterDivergedError as error:
             raise ValueError(
-                f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade"
-            )
+                f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade ({error})"
+            ) from error
 
     @cached_property
     def true_position(self) -> Floats:

@@ -158,11 +158,12 @@ class RecordedRanges(RecordedScenario):
         Without a reference it runs twice: along the fixes of the ranges, and along its own first solution, so that a
         game, whose reference is the clean run, has the same lines of sight.
         """
-        run = self._clean_along(self.model)
-        self._check_clean(run)
-        if self._truth is None:
-            run = self._clean_along(replace(self.model, true_position=run.position[1:], true_velocity=run.velocity[1:]))
-        return run
+        with self._refusing_divergence():
+            run = self._clean_along(self.model)
+            if self._truth is not None:
+                return run
+            own = replace(self.model, true_position=run.position[1:], true_velocity=run.velocity[1:])
+            return self._clean_along(own)
 
     def _clean_along(self, model: StrapdownModel) -> TightCleanRun:
         satellites, unknown = self.ranges.geometry.position, np.zeros(len(self.epoch_time))
