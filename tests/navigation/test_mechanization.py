@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from pyins import earth, sim, strapdown
 from scipy.spatial.transform import Rotation
 
 from spoofgym.geodesy import normal_gravity, position_difference
+from spoofgym.kernels import njit
 from spoofgym.navigation.mechanization import (
     attitude_matrix,
     euler_angles,
