@@ -22,10 +22,11 @@ OLDEST = {"x86_64": "Nehalem", "amd64": "Nehalem", "aarch64": "ARMV8", "arm64": 
 
 def other_kernels() -> dict[str, str]:
     """The variables that choose the code for the oldest processors of this machine's kind."""
+    extensions = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     return {
         "NUMBA_CPU_NAME": "generic",
         "OPENBLAS_CORETYPE": OLDEST.get(platform.machine().lower(), ""),
-        "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),
+        "NPY_DISABLE_CPU_FEATURES": " ".join(extensions),
     }
 
 
