@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
@@ -11,6 +10,7 @@ from spoofgym.detectors import cpi_theory
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_P_FA
 from spoofgym.detectors.ring import MovingSum
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.specification import spell
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.ring import MovingSum
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WINDOW = 20

@@ -14,12 +14,12 @@ triangular and the code comes first, so that the first S components of w = L‚Åª¬
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_P_FA, at_all_degrees, nominal_p_fa, quantile
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.facts import RANGES, FilterFacts
 from spoofgym.navigation.interface import Epoch, Innovation

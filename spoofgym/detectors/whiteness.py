@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WINDOW = 60

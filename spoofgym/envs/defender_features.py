@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.envs.observation import AXES, Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
+from spoofgym.kernels import njit
 from spoofgym.responses.onset import OnsetEstimator
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation

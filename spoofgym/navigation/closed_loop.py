@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import enu_difference, enu_displacement
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
 from spoofgym.navigation.mechanization import load_matrix, mechanize, product, rotation, transpose

@@ -7,10 +7,10 @@ linear by itself (clock, atmosphere, multipath, ambiguities) is carried as its e
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, ecef, geodetic_to_ecef
+from spoofgym.kernels import njit
 from spoofgym.navigation import closed_loop, kalman, tight_filter
 from spoofgym.navigation.divergence import blank
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES

@@ -15,9 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.response import error_response
 from spoofgym.optimum.survival import check_threshold, log_survival

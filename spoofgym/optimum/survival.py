@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 # Beyond this distance of |u| from √threshold the leading term of the asymptotic expansion replaces the mixture.
 _FAR = 1000.0

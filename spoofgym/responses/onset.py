@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs, take_runs
+from spoofgym.kernels import njit
 
 WINDOW = 50
 """Epochs among which the onset is looked for."""

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
 DEGREE_PER_ROOT_HOUR = math.pi / 180.0 / 60.0
