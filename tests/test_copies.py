@@ -32,7 +32,7 @@ TIGHT = "kujur-flight:horizon=24,onset=120"
 ROBOT = "song-robot:horizon=24"
 GAMES = [(text, fidelity) for text in (LOOSE, TIGHT) for fidelity in ("linear", "strapdown")] + [(ROBOT, "linear")]
 BEFORE, AFTER = 9, 12
-QUIET = 1e9
+QUIET = 1e8
 """A threshold that no clean statistic exceeds, so that nothing need be calibrated."""
 REQUIRED = {"rate": "0.5", "jump": "2", "radius": "20", "delay": "3", "d": "1.2", "azimuth": "90", "attack": "ramp:0.5"}
 """Values for options of attacks that have no default."""
