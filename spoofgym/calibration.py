@@ -88,7 +88,10 @@ class _Search:
         if not statistics.any():
             raise ValueError(f"detector {self.detector.name!r}: the statistic is 0 in all clean runs")
         counted = self._counted
-        counted.add(burn_in, statistics)
+        try:
+            counted.add(burn_in, statistics)
+        except ValueError as error:
+            raise ValueError(f"detector {self.detector.name!r}: {error}") from error
         threshold = counted.threshold(self._arl0)
         alarms, at_risk = counted.at(threshold)
         if alarms >= self._first_alarms:

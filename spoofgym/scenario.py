@@ -10,6 +10,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
+from spoofgym.immutable import Immutable
 from spoofgym.navigation.adaptation import Adaptation
 from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
@@ -35,7 +36,7 @@ ROUNDING = 1e-9
 """Times closer than this are the same, s."""
 
 
-class Scenario(ABC):
+class Scenario(Immutable, ABC):
     """What a simulation asks of a scenario.
 
     Attributes:

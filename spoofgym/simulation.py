@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.detectors.base import Detector, seen, seen_dimension
+from spoofgym.detectors.base import Detector, require_threshold, seen_dimension, statistic_of
 from spoofgym.navigation.divergence import diverged_error
 from spoofgym.navigation.facts import LINEAR_MODEL, RANGES
 from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
@@ -138,8 +138,7 @@ class Simulation:
             detector.bind(self.num_runs, self._seen_dimension(detector))
             self.scenario.facts.require(f"detector {detector.name!r}", detector.needs)
             detector.know(self.scenario.facts)
-            if detector.threshold is None:
-                raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
+            require_threshold(detector)
 
     def _seen_dimension(self, detector: Detector) -> int:
         return seen_dimension(detector, self.scenario.dimension, self.scenario.coupling == "tight")
@@ -261,8 +260,7 @@ class Simulation:
         """
         alarm = np.zeros(len(epoch.index), dtype=bool)
         for name, detector in detectors.items():
-            statistic = detector.update(seen(detector, epoch))
-            epoch.statistics[name] = statistic
+            statistic = epoch.statistics[name] = statistic_of(detector, epoch)
             assert detector.threshold is not None
             alarm |= (statistic > detector.threshold) & (epoch.index >= -detector.memory)
         return alarm

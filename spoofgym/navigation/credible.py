@@ -8,6 +8,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
 from spoofgym.navigation.credible_filter import (
     HEIGHT,
@@ -61,7 +62,7 @@ class AuxiliaryRule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CredibleModel:
+class CredibleModel(Immutable):
     """What the N runs go through, epochs 0..K.
 
     Attributes:

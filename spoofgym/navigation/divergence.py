@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 
 MAX_LATITUDE = math.radians(89.9)
 """East has no meaning at a pole: the transport rate grows with the tangent of the latitude, rad."""

@@ -115,7 +115,7 @@ class StrapdownNavigator:
             self.attitude[run] = model.attitude
             closed_loop.rotate(self.attitude[run], -x[0], -x[1], -x[2])
             if self._noisy:
-                self._generators[int(run)] = streams(run, "imu").spawn(1)[0]
+                self._generators[int(run)] = streams.spawn(run, "imu")
         self._instability[runs] = initial[:, INSTABILITY]
         self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
         self.bias[runs] = self.true_bias[runs] - error[:, 9:15]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats
 from spoofgym.geodesy import displace
+from spoofgym.immutable import Immutable
 from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import antenna_arm
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
@@ -18,7 +19,7 @@ from spoofgym.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class StrapdownModel:
+class StrapdownModel(Immutable):
     """What N strapdown navigators have in common: epochs k = 0..K, of which 0 is the last clean one.
 
     The samples come from a true trajectory, with sensor errors added per run, or from a recorded log, whose samples

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman, tight_filter
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
@@ -34,7 +35,7 @@ from spoofgym.sensors.ranging import RangeErrors, clock_noise
 
 
 @dataclass(frozen=True)
-class TightDynamics:
+class TightDynamics(Immutable):
     """What acts on the error state, epoch by epoch, and what observes it; leading axis: epochs.
 
     Attributes:
@@ -123,7 +124,7 @@ class TightDynamics:
 
 
 @dataclass(frozen=True)
-class TightModel:
+class TightModel(Immutable):
     """A game of the tightly coupled filter: epochs k = 0..K, of which 0 is the last clean one; every range used.
 
     Attributes:

@@ -103,9 +103,8 @@ class TightStrapdownNavigator(StrapdownNavigator):
         for run, x in zip(runs.tolist(), error, strict=True):
             self.attitude[run] = model.attitude
             closed_loop.rotate(self.attitude[run], -x[0], -x[1], -x[2])
-            stream = streams(run, "imu")
-            stream.standard_normal(out=self.range_normals[run])
-            self._generators[run] = stream.spawn(1)[0]
+            streams(run, "imu").standard_normal(out=self.range_normals[run])
+            self._generators[run] = streams.spawn(run, "imu")
         self.diverged[runs] = False
         self._hold(runs)
 
