@@ -91,7 +91,7 @@ class Scenario(Immutable, ABC):
 
     def manoeuvres(self) -> tuple[float, ...]:
         """Times within the game at which the vehicle begins to change its velocity, s."""
-        return manoeuvre_times(self.velocity(), self.timeline)
+        return manoeuvre_times(self.velocity_in_steps(), self.timeline)
 
     @abstractmethod
     def times(self, burn_in: int) -> Floats:
@@ -100,6 +100,13 @@ class Scenario(Immutable, ABC):
     @abstractmethod
     def velocity(self, burn_in: int = 0) -> Floats:
         """The true velocity at epochs -burn_in..K, which a spoofer tracks, (burn_in + K + 1, 3), ENU, m/s."""
+
+    def velocity_in_steps(self) -> Floats:
+        """The true velocity at the moments of the timeline's steps, (M+1, 3), ENU, m/s.
+
+        These are epochs 0..K where no epoch is missing.
+        """
+        return self.velocity()
 
     @abstractmethod
     def track(self) -> Floats:
@@ -262,7 +269,7 @@ class SimulatedScenario(Scenario):
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, self.receiver.interval, self.horizon)
+        return Timeline.steady(self.onset, self.receiver.interval, self.horizon)
 
     @property
     def dimension(self) -> int:  # type: ignore[override]
@@ -295,7 +302,7 @@ class SimulatedScenario(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         start = self.onset - burn_in * self.receiver.interval
-        return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
+        return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
 
     def velocity(self, burn_in: int = 0) -> Floats:
         """The true velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s."""
@@ -349,7 +356,7 @@ class SimulatedScenario(Scenario):
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """The game in the linear fidelity, from epoch -burn_in on, under the filter with constant R and Q."""
         first = self._first(burn_in)
-        timeline = Timeline(
+        timeline = Timeline.steady(
             self.onset - burn_in * self.receiver.interval, self.receiver.interval, self.horizon + burn_in
         )
         dynamics = self._epochs(first, first + timeline.num_epochs + 1)
@@ -374,7 +381,7 @@ class SimulatedScenario(Scenario):
             self.tuning,
             self.true_position_random_walk,
             self.warm_start(burn_in).filter_covariance,
-            Timeline(self.times(burn_in)[0], interval, self.horizon + burn_in),
+            Timeline.steady(self.times(burn_in)[0], interval, self.horizon + burn_in),
         )
         if self.adaptation is not None:
             return AdaptiveStrapdownNavigator(model, num_runs, slices, self.adaptation, demands)

@@ -128,7 +128,7 @@ class Simulation:
         if attack.needs_ranges:
             self.scenario.facts.require(f"attack {attack.name!r}", (RANGES,))
         attack.bind(self.scenario.timeline, self.num_runs)
-        attack.follow(self.scenario.velocity())
+        attack.follow(self.scenario.velocity_in_steps())
         if attack.needs_model:
             self.scenario.facts.require(f"attack {attack.name!r}", (LINEAR_MODEL,))
             attack.study(self.scenario.linear_model())

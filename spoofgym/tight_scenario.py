@@ -98,7 +98,7 @@ class TightScenario(Scenario):
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, 1.0 / self.rate, self.horizon)
+        return Timeline.steady(self.onset, 1.0 / self.rate, self.horizon)
 
     @property
     def dimension(self) -> int:  # type: ignore[override]
@@ -123,7 +123,7 @@ class TightScenario(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         interval = self.timeline.interval
-        return Timeline(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
+        return Timeline.steady(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
 
     def _samples(self, times: Floats) -> Runs:
         return np.asarray(np.round(times * self.trajectory.rate), dtype=np.int64)
@@ -211,7 +211,7 @@ class TightScenario(Scenario):
             self.tuning,
             self.tuning.position_random_walk,
             model.prior_covariance,
-            Timeline(times[0], self.timeline.interval, self.horizon + burn_in),
+            Timeline.steady(times[0], self.timeline.interval, self.horizon + burn_in),
         )
         first = self._first(burn_in)
         satellites = self.geometry.position[first : first + len(times)]

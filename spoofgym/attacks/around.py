@@ -33,7 +33,7 @@ class AroundAttack(Attack):
         super().bind(timeline, num_runs)
 
     def follow(self, velocity: Floats) -> None:
-        """Tell the attack inside the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        """Tell the attack inside the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
         self.attack.follow(velocity)
 
     def study(self, model: LinearModel) -> None:

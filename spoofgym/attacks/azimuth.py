@@ -38,9 +38,10 @@ class Azimuth(FixedOffsets):
     """The receiver is led along the true speed with a false azimuth (FOI-R-5687, chapter 4).
 
     The spoofed position advances by the turned velocity of the coming epoch, p(i+1) = p(i) + v(i+1) Δt, from the true
-    position at the onset. This rectangle rule is the report's: in a turn of the vehicle it adds half an interval's
-    change of velocity to the offset, 10 m in 60 degrees at 20 m/s, and the report's figures have that in them. Its
-    horizontal speed is scaled by the vertical velocity, which is left out. The offset is zero again after the end.
+    position at the onset; where epochs are missing it goes on in steps of the usual interval. This rectangle rule is
+    the report's: in a turn of the vehicle it adds half an interval's change of velocity to the offset, 10 m in 60
+    degrees at 20 m/s, and the report's figures have that in them. Its horizontal speed is scaled by the vertical
+    velocity, which is left out. The offset is zero again after the end.
 
     Args:
         azimuth: largest error, degrees clockwise.
@@ -93,20 +94,21 @@ class Azimuth(FixedOffsets):
         self._end = timeline.end if self.end is None else self.end
 
     def follow(self, velocity: Floats) -> None:
-        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
-        times, interval, end = self._timeline.times, self._timeline.interval, self._end
-        since = self._since()
-        decay = max(min(self.decay, end - self._onset - self.growth), interval)
+        """Take the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
+        end = self._end
+        decay = max(min(self.decay, end - self._onset - self.growth), self._timeline.interval)
+        moments, lengths, epochs = self._timeline.steps
+        since = moments - self._onset
         error = -azimuth_error(np.maximum(since, 0.0), np.radians(self.azimuth), self.growth, decay)
         cosine, sine = np.cos(error), np.sin(error)
         east, north = velocity[:, 0], velocity[:, 1]
         turned = np.stack([cosine * east - sine * north, sine * east + cosine * north], axis=1)
-        inside = (since > 1e-9) & (times <= end + 1e-9)
+        inside = (since > 1e-9) & (moments <= end + 1e-9)
         travelled = 0.5 * (velocity[1:, :2] + velocity[:-1, :2])
-        steps = np.where(inside[1:, None], (turned[1:] - travelled) * interval, 0.0)
+        moved = np.where(inside[1:, None], (turned[1:] - travelled) * lengths[:, None], 0.0)
         self._offsets[:] = 0.0
-        self._offsets[1:, :2] = np.cumsum(steps, axis=0)
-        self._offsets[~inside] = 0.0
+        self._offsets[1:, :2] = np.cumsum(moved, axis=0)[epochs[1:] - 1]
+        self._offsets[~inside[epochs]] = 0.0
 
     def active(self, clock: Clock) -> Flags:
         """Whether the receiver follows the spoofer, (N,): to the end of the attack."""

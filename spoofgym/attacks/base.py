@@ -55,7 +55,11 @@ class Attack(ABC):
         """Start new episodes; a random attack draws here, a block per run from the stream "opponent"."""
 
     def follow(self, velocity: Floats) -> None:  # noqa: B027 - most attacks do not care where the vehicle goes
-        """Take the vehicle's true velocity at epochs 0..K, which a spoofer tracks, (K+1, 3), ENU, m/s; after `bind`."""
+        """Take the vehicle's true velocity, which a spoofer tracks; after `bind`.
+
+        Args:
+            velocity: at the moments of the timeline's steps, (M+1, 3), ENU, m/s: at epochs 0..K where none is missing.
+        """
 
     def study(self, model: LinearModel) -> None:  # noqa: B027 - most attacks are blind to the filter
         """Take the victim's linear model, epochs 0..K, every fix used; after `follow`, and only where it is needed."""

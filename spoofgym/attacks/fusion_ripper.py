@@ -18,10 +18,10 @@ MOVING = 0.1
 
 
 def lateral(velocity: Floats, side: str) -> Floats:
-    """Horizontal unit vectors at right angles to the direction of travel, (K+1, 3), ENU.
+    """Horizontal unit vectors at right angles to the direction of travel, (M+1, 3), ENU.
 
     Args:
-        velocity: at epochs 0..K, (K+1, 3), ENU, m/s.
+        velocity: at consecutive moments, (M+1, 3), ENU, m/s.
         side: "left" or "right" of the direction of travel. A vehicle that stands keeps its last direction, before it
             first moves the one in which it will.
 
@@ -96,12 +96,13 @@ class FusionRipper(FixedOffsets):
         )
 
     def follow(self, velocity: Floats) -> None:
-        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s.
+        """Take the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s.
 
         Raises:
             ValueError: the vehicle never moves.
         """
-        self._lay(self._distance(self._since())[:, None] * lateral(velocity, self.side))
+        _, _, epochs = self._timeline.steps
+        self._lay(self._distance(self._since())[:, None] * lateral(velocity, self.side)[epochs])
 
     def _distance(self, since: Floats) -> Floats:
         """The offset's length at times since the onset (n,), m."""

@@ -156,7 +156,7 @@ class RandomProfile(Attack):
         if self.end is not None and not self.end > self._onset:
             raise ValueError(f"attack {self.name!r}: end {self.end:g} s must be after the onset, {self._onset:g} s")
         index = np.arange(timeline.num_epochs + 1)
-        clock = Clock(index, np.asarray(timeline.start + timeline.interval * index, dtype=np.float64))
+        clock = Clock(index, timeline.times)
         self._runs = np.arange(num_runs)
         self._columns = [AXES.index(letter) for letter in self.axes]
         self._elapsed = self.elapsed(clock)

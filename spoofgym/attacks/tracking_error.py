@@ -70,7 +70,7 @@ class TrackingError(AroundAttack):
         shape = self._errors.shape[1:]
         for run in runs.tolist():
             stream = streams(run, "tracking")
-            error = draw_tracking_error(stream, shape, self.sigma, self.time, self._timeline.interval)
+            error = draw_tracking_error(stream, shape, self.sigma, self.time, self._timeline.intervals)
             self._errors[run] = np.where(self._errs, error, 0.0)
 
     def offset(self, clock: Clock) -> Floats:

@@ -124,9 +124,9 @@ class SpooferGame:
         self._start_error = np.zeros(num_lanes)
         self.offset = np.zeros((num_lanes, len(rates)))
         self._velocity = scenario.velocity()
-        self._rate = np.array(rates) * scenario.timeline.interval
-        self._horizon = scenario.timeline.num_epochs
-        self._interval = scenario.timeline.interval
+        timeline = scenario.timeline
+        self._horizon, self._interval, self._intervals = timeline.num_epochs, timeline.interval, timeline.intervals
+        self._reach = np.array(rates) * self._intervals[:, None]
         self._tracking_sigma = np.full((num_lanes, 1), config.tracking_sigma)
         self._all = np.arange(num_lanes)
         self._tracking = np.zeros((num_lanes, self._horizon + 1, 6))
@@ -163,7 +163,7 @@ class SpooferGame:
             sigma, time, shape = self.config.tracking_sigma, self.config.tracking_time, self._tracking.shape[1:]
             for lane in lanes:
                 stream = self.simulation.streams(lane, "tracking")
-                self._tracking[lane] = draw_tracking_error(stream, shape, sigma, time, self._interval)
+                self._tracking[lane] = draw_tracking_error(stream, shape, sigma, time, self._intervals)
         if self.shadow is not None:
             self.shadow.reset(lanes)
 
@@ -224,7 +224,7 @@ class SpooferGame:
     def _intend(self, actions: Floats, previous: Floats) -> Floats:
         """The offset that the spoofer means to send, (N, 3) or (N, 4), m ENU and m."""
         if self.config.action == "rate":
-            return previous + actions * self._rate
+            return previous + actions * self._reach[np.minimum(self.index, self._horizon - 1)]
         assert isinstance(self.shadow, ShadowFilter)
         following = np.minimum(self.index + 1, self._horizon)
         return self.shadow.offset_for(following, INNOVATION_UNIT * actions)

@@ -16,7 +16,7 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
 from spoofgym.evaluation.monte_carlo import horizontal
-from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.navigation.interface import Decision, Demands, Timeline
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching
 from spoofgym.scenario import Scenario
@@ -39,7 +39,7 @@ class DefenceEpisodes:
         clean: there was a fix, neither spoofed nor disturbed by multipath, (n, K).
         member: the opponent, an index into ``names``, (n,); -1 = none.
         names: of the opponents.
-        interval: between epochs, s.
+        timeline: of the games.
     """
 
     error: Floats
@@ -49,7 +49,7 @@ class DefenceEpisodes:
     clean: Flags
     member: Runs
     names: tuple[str, ...]
-    interval: float
+    timeline: Timeline
 
     def of(self, games: Any) -> DefenceEpisodes:
         """Some of the games."""
@@ -276,7 +276,7 @@ class _Record:
             clean,
             attack.member.copy(),
             tuple(attack.names),
-            simulation.scenario.timeline.interval,
+            simulation.scenario.timeline,
         )
 
 

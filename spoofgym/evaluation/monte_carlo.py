@@ -12,6 +12,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.navigation.interface import Timeline
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
@@ -31,14 +32,14 @@ class Episodes:
         alarm_error: horizontal error of the estimate at the first alarm, (n,), m; of no meaning where there was none.
         final_error: horizontal error after the last fix was used, (n,), m.
         onset_epoch: the last one before the attack, (n,); 0 where there is none.
-        interval: between epochs, s.
+        timeline: of the games.
     """
 
     alarm_epoch: Runs
     alarm_error: Floats
     final_error: Floats
     onset_epoch: Runs
-    interval: float
+    timeline: Timeline
 
     @property
     def detected(self) -> NDArray[np.bool_]:
@@ -56,7 +57,7 @@ class WatchedEpisodes:
         peak: highest statistic over its threshold from the attack on, (D, n); in epochs 1..K where there is none.
         final_error: horizontal error after the last fix was used, (n,), m.
         onset_epoch: the last one before the attack, (n,); 0 where there is none.
-        interval: between epochs, s.
+        timeline: of the games.
     """
 
     alarm_epoch: Runs
@@ -64,22 +65,22 @@ class WatchedEpisodes:
     peak: Floats
     final_error: Floats
     onset_epoch: Runs
-    interval: float
+    timeline: Timeline
 
     def of(self, detector: int) -> Episodes:
         """As one detector, by its place, saw them."""
         alarm_epoch, alarm_error = self.alarm_epoch[detector], self.alarm_error[detector]
-        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.interval)
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
 
     def together(self) -> Episodes:
         """As all detectors at once: the first alarm of any."""
         n = len(self.final_error)
         if not len(self.alarm_epoch):
-            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.onset_epoch, self.interval)
+            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.onset_epoch, self.timeline)
         epoch = np.where(self.alarm_epoch == NEVER, np.iinfo(np.int64).max, self.alarm_epoch)
         first, runs = epoch.argmin(axis=0), np.arange(n)
         alarm_epoch, alarm_error = self.alarm_epoch[first, runs], self.alarm_error[first, runs]
-        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.interval)
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
 
 
 def horizontal(error: Floats) -> Floats:
@@ -141,8 +142,8 @@ def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch
 
 
 def _watched(simulation: Simulation, watch: _Watch, onset_epoch: Runs, final_error: Floats) -> WatchedEpisodes:
-    interval = simulation.scenario.timeline.interval
-    return WatchedEpisodes(watch.alarm_epoch, watch.alarm_error, watch.peak, final_error, onset_epoch, interval)
+    timeline = simulation.scenario.timeline
+    return WatchedEpisodes(watch.alarm_epoch, watch.alarm_error, watch.peak, final_error, onset_epoch, timeline)
 
 
 def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
@@ -152,7 +153,7 @@ def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
         np.concatenate([part.peak for part in parts], axis=1),
         np.concatenate([part.final_error for part in parts]),
         np.concatenate([part.onset_epoch for part in parts]),
-        parts[0].interval,
+        parts[0].timeline,
     )
 
 

@@ -1,8 +1,9 @@
 """The strapdown fidelity: N loosely coupled INS/GNSS filters at the IMU rate, closed loop.
 
-Between two fixes each run mechanizes its own noisy samples; at the epoch the error dynamics are formed once, from the
-mean specific force and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order;
-process noise half before, half after Φ). The estimated error is fed back into the mechanization after every used fix.
+Between two fixes each run mechanizes its own noisy samples; the error dynamics are formed from the mean specific force
+and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order; process noise half
+before, half after Φ). A long epoch, as an outage of a recorded log, is cut into parts of about a second, for each of
+which this is done. The estimated error is fed back into the mechanization after every used fix.
 
 The history is a ring of the states after each resolved epoch. A backtrack of n epochs restores the state after the fix
 before them and mechanizes the stored inertial samples (their stored noise on the true motion) to the present epoch.
@@ -179,7 +180,7 @@ class StrapdownNavigator:
             model.angular_rate,
             model.specific_force,
             model.step,
-            model.boundaries,
+            *model.parts,
             model.latency_samples,
             model.filter_density,
             self._process_scale,

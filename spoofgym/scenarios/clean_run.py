@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from spoofgym.arrays import Floats
 from spoofgym.navigation.divergence import diverged_error
 from spoofgym.navigation.interface import Decision
 from spoofgym.navigation.loose import StrapdownNavigator
+from spoofgym.navigation.mechanization import mechanize
 from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.tight_strapdown import TightStrapdownNavigator
 from spoofgym.navigation.warm_start import NUM_JOINT
@@ -73,6 +75,53 @@ def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> Ti
     state = navigator.state
     parts = _states(navigator, np.zeros(state.shape[1] + NUM_BIASES), deviation, lambda: state)
     return TightCleanRun(*parts)
+
+
+def coast(model: StrapdownModel, run: CleanRun, epoch: int) -> tuple[Floats, Floats]:
+    """The filter's velocity on the way to an epoch, by inertial samples from the state after the epoch before.
+
+    Args:
+        model: of the log.
+        run: on it.
+        epoch: of the model.
+
+    Returns:
+        Times of the samples' ends, the epoch before first, (n + 1,), s, and velocities, (n + 1, 3), ENU, m/s.
+    """
+    samples = slice(model.boundaries[epoch], model.boundaries[epoch + 1])
+    velocity = np.empty((samples.stop - samples.start + 1, 3))
+    _coast(
+        run.attitude[epoch].copy(),
+        run.velocity[epoch].copy(),
+        run.position[epoch].copy(),
+        run.bias[epoch],
+        model.angular_rate[samples],
+        model.specific_force[samples],
+        model.step[samples],
+        velocity,
+    )
+    time = model.time[epoch] - np.append(np.cumsum(model.step[samples][::-1])[::-1], 0.0)
+    return time, velocity
+
+
+@njit(cache=True, nogil=True)
+def _coast(
+    attitude: Floats,
+    velocity: Floats,
+    position: Floats,
+    bias: Floats,
+    angular_rate: Floats,
+    specific_force: Floats,
+    step: Floats,
+    result: Floats,
+) -> None:
+    """Mechanize samples less the biases from a state, in place; the velocity before and after each, (n + 1, 3)."""
+    unused = np.zeros(3)
+    result[0] = velocity
+    for i in range(len(step)):
+        rate, force = angular_rate[i] - bias[:3], specific_force[i] - bias[3:]
+        mechanize(attitude, velocity, position, rate, force, step[i], unused)
+        result[i + 1] = velocity
 
 
 def _states(

@@ -19,7 +19,7 @@ from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.alignment import Alignment, align
-from spoofgym.scenarios.clean_run import CleanRun
+from spoofgym.scenarios.clean_run import CleanRun, coast
 from spoofgym.scenarios.log import Log, interpolate
 from spoofgym.sensors.imu import ImuGrade
 
@@ -31,7 +31,7 @@ MAX_IMU_GAP = 0.5
 class RecordedScenario(Scenario):
     """A game on a log, in the strapdown fidelity. The filter is aligned on its fixes and runs from there.
 
-    ``timeline.interval`` is the median of those between the epochs.
+    Epochs are where the receiver gave something; ``timeline.interval`` is the median of the times between them.
 
     Attributes:
         name: the specification that builds it.
@@ -144,7 +144,7 @@ class RecordedScenario(Scenario):
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
         time = self.epoch_time[self.first : self.last + 1]
-        return Timeline(float(time[0]), float(np.median(np.diff(time))), len(time) - 1)
+        return Timeline(time, float(np.median(np.diff(time))))
 
     def _check_imu(self, onset: float, end: float) -> None:
         time, begin = self.log.imu_time, self.align_time
@@ -266,6 +266,24 @@ class RecordedScenario(Scenario):
     def velocity(self, burn_in: int = 0) -> Floats:
         """The velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s: the reference's, else the clean run's."""
         return self.true_velocity[self._first(burn_in) : self.last + 1]
+
+    def velocity_in_steps(self) -> Floats:
+        """The velocity at the moments of the timeline's steps, (M+1, 3), ENU, m/s.
+
+        Between epochs it is that of the inertial samples, which a straight line in time leads from the velocity at one
+        epoch to that at the next.
+        """
+        moments, _, epochs = self.timeline.steps
+        velocity = np.empty((len(moments), 3))
+        velocity[epochs] = self.velocity()
+        for k in np.flatnonzero(np.diff(epochs) > 1).tolist():
+            inside, ends = moments[epochs[k] + 1 : epochs[k + 1]], self.timeline.times[[k, k + 1]]
+            time, coasting = coast(self.model, self.clean, self.first + k + 1)
+            amiss = velocity[epochs[[k, k + 1]]] - coasting[[0, -1]]
+            for a in range(3):
+                between = np.interp(inside, time, coasting[:, a]) + np.interp(inside, ends, amiss[:, a])
+                velocity[epochs[k] + 1 : epochs[k + 1], a] = between
+        return velocity
 
     def track(self) -> Floats:
         """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""

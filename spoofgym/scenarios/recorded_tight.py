@@ -14,7 +14,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.closed_loop import mechanize_epoch
+from spoofgym.navigation.closed_loop import mechanize_part
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
@@ -122,6 +122,7 @@ class RecordedRanges(RecordedScenario):
         return replace(
             steady,
             time=ranges.time,
+            intervals=np.diff(ranges.time, prepend=self.align_time),
             started=ranges.started,
             noise_variance=np.where(np.tile(ranges.geometry.present, 2), sigma**2, 1.0),
         )
@@ -203,27 +204,34 @@ class RecordedRanges(RecordedScenario):
         transition = np.empty((stop - first, NUM_NAVIGATION, NUM_STATES))
         noise = np.empty((stop - first, NUM_NAVIGATION, NUM_NAVIGATION))
         density = np.diag(model.filter_density[:NUM_NAVIGATION])
+        bounds, places = model.parts
+        one = np.empty((NUM_NAVIGATION, NUM_STATES))
         for k in range(first, stop):
             attitude, velocity, position = clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy()
-            interval = mechanize_epoch(
-                model.boundaries[k],
-                model.boundaries[k + 1],
-                0,
-                -clean.bias[k],
-                np.empty(0),
-                model.angular_rate,
-                model.specific_force,
-                model.step,
-                model.true_noise,
-                attitude,
-                velocity,
-                position,
-                np.empty((6, 3)),
-                np.empty(3),
-                transition[k - first],
-            )
-            phi, half = transition[k - first, :, :NUM_NAVIGATION], 0.5 * interval * density
-            noise[k - first] = phi @ half @ phi.T + half
+            total, gathered = np.eye(NUM_NAVIGATION, NUM_STATES), np.zeros((NUM_NAVIGATION, NUM_NAVIGATION))
+            for part in range(places[k], places[k + 1]):
+                length = mechanize_part(
+                    bounds[part],
+                    bounds[part + 1],
+                    -1,
+                    -clean.bias[k],
+                    np.empty(0),
+                    model.angular_rate,
+                    model.specific_force,
+                    model.step,
+                    model.true_noise,
+                    attitude,
+                    velocity,
+                    position,
+                    np.empty((6, 3)),
+                    np.empty(3),
+                    one,
+                )
+                phi, half = one[:, :NUM_NAVIGATION], 0.5 * length * density
+                total = phi @ total
+                total[:, NUM_NAVIGATION:] += one[:, NUM_NAVIGATION:]
+                gathered = phi @ (gathered + half) @ phi.T + half
+            transition[k - first], noise[k - first] = total, gathered
         return transition, noise
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:

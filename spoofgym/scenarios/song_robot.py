@@ -140,7 +140,7 @@ class SongRobot(Scenario):
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, self.receiver.interval, self.horizon)
+        return Timeline.steady(self.onset, self.receiver.interval, self.horizon)
 
     @property
     def bias_sigma(self) -> Floats:
@@ -170,7 +170,7 @@ class SongRobot(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         start = self.onset - burn_in * self.receiver.interval
-        return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
+        return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
 
     @cache  # noqa: B019 - scenarios live as long as the program
     def motion(self, burn_in: int = 0) -> PlanarMotion:

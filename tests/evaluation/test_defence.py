@@ -102,7 +102,7 @@ def plain(world, use):
 def test_the_games_have_everything_in_them(played):
     games = played["never"]
     assert games.error.shape == (EPISODES, EPOCHS)
-    assert games.interval == 1.0
+    assert games.timeline.interval == 1.0
     assert (games.member == -1).any()
     assert set(games.member[games.member >= 0]) == set(range(len(games.names)))
     assert not games.available.all()
