@@ -8,11 +8,12 @@ that of the log, or else the unspoofed run of the same filter.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.navigation.closed_loop import mechanize_epoch
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
@@ -188,7 +189,7 @@ class RecordedRanges(RecordedScenario):
         satellites, clock = self.ranges.geometry.position[first:stop], self.clean.state[first + 1 : stop + 1, CLOCK]
         return TightReplayNavigator(self._game_model(first), tight, satellites, clock, num_runs, slices, demands)
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def tight_model(self, burn_in: int = 0) -> TightModel:
         """The covariances of the game along the clean run, from epoch -burn_in on, every range used."""
         first, stop = self._first(burn_in), self.last + 1
