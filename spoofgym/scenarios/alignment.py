@@ -14,6 +14,7 @@ from spoofgym.arrays import Floats
 from spoofgym.geodesy import normal_gravity
 from spoofgym.navigation.mechanization import attitude_matrix
 from spoofgym.scenarios.log import Log, velocity_of
+from spoofgym.scenarios.table import seconds
 
 MIN_SPEED = 5.0
 """Slowest speed whose course is trusted as heading, m/s."""
@@ -53,13 +54,13 @@ def align(log: Log) -> Alignment:
     if len(moving) == 0:
         raise ValueError(
             f"log {str(log.folder)!r}: the vehicle must move at {MIN_SPEED:g} m/s or more after start_s = "
-            f"{log.start:g} s, so that its course gives the heading"
+            f"{seconds(log.start)} s, so that its course gives the heading"
         )
     fix = int(moving[0])
     course = np.arctan2(velocity[fix, 0], velocity[fix, 1])
     window = (log.imu_time >= fixes.time[fix - 1]) & (log.imu_time <= fixes.time[fix + 1])
     if not window.any():
-        raise ValueError(f"log {str(log.folder)!r}: no IMU samples around the alignment at {fixes.time[fix]:g} s")
+        raise ValueError(f"log {str(log.folder)!r}: no IMU samples around the alignment at {seconds(fixes.time[fix])} s")
     force = log.specific_force[window].mean(axis=0)
     acceleration = (velocity[fix + 1] - velocity[fix - 1]) / (fixes.time[fix + 1] - fixes.time[fix - 1])
     position = fixes.position[fix]

@@ -12,7 +12,7 @@ from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios.log import Fixes, Log
 from spoofgym.scenarios.range_fixes import RangeSolution, fixes_of, range_delay, solve_ranges
 from spoofgym.scenarios.ranges_log import Ranges, correct, read_ranges
-from spoofgym.scenarios.table import has_table
+from spoofgym.scenarios.table import has_table, seconds
 from spoofgym.sensors.geometry import SatelliteGeometry
 
 UNSTEADY = 0.1
@@ -141,7 +141,7 @@ def steady(ranges: Ranges, owner: str) -> Ranges:
     off = np.flatnonzero(np.abs(steps - number) > UNSTEADY)
     if len(off):
         raise ValueError(
-            f"{owner}: ranges must come at a steady rate: after {ranges.time[off[0]]:.9g} s the next come "
+            f"{owner}: ranges must come at a steady rate: after {seconds(ranges.time[off[0]])} s the next come "
             f"{steps[off[0]] * interval:.4g} s later, with a median of {interval:.4g} s"
         )
     place = np.concatenate([[0], np.cumsum(number).astype(np.int64)])

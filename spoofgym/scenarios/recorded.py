@@ -30,6 +30,7 @@ from spoofgym.scenarios.range_epochs import range_epochs
 from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
+from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
@@ -81,7 +82,7 @@ class RecordedFixes(RecordedScenario):
         first = self.alignment.fix
         stop = int(np.searchsorted(self.log.fixes.time, self._end, side="right"))
         if stop - first < 4:
-            raise ValueError(f"scenario {self.name!r}: too few fixes after the alignment at {self.align_time:g} s")
+            raise ValueError(f"scenario {self.name!r}: too few fixes after the alignment at {seconds(self.align_time)} s")
         return slice(first + 1, stop)
 
     @cached_property
@@ -185,7 +186,7 @@ def recorded(
         raise ValueError("recorded: velocity, sigma_floor and fixes are of fixes; coupling=tight takes none")
     options = {
         "grade": (grade, "automotive"),
-        "onset": (onset, None),
+        "onset": (None if onset is None else np.format_float_positional(onset, trim="-"), None),
         "horizon": (horizon, None),
         "velocity": (velocity, None),
         "sigma_floor": (sigma_floor, SIGMA_FLOOR),

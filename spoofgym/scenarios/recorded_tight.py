@@ -28,6 +28,7 @@ from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import TightCleanRun, tight_clean_run
 from spoofgym.scenarios.range_epochs import RangeEpochs
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.ranging import KUJUR, DrawnErrors, RangeErrors, pseudoranges
 from spoofgym.streams import RunStreams
 from spoofgym.tight_scenario import along, captured_ranges, disturbed_ranges
@@ -84,7 +85,7 @@ class RecordedRanges(RecordedScenario):
         start = int(self.epochs.fix[self.alignment.fix]) + 1
         stop = int(np.searchsorted(self.epochs.time, self._end, side="right"))
         if stop - start < 4:
-            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {self.align_time:g} s")
+            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s")
         return self.epochs.part(start, stop)
 
     @property
@@ -156,13 +157,14 @@ class RecordedRanges(RecordedScenario):
     def clean(self) -> TightCleanRun:
         """The filter on the unspoofed ranges, from the alignment to the end of the log.
 
-        Without a reference it runs twice: along the fixes of the ranges, and along its own first solution, so that a
-        game, whose reference is the clean run, has the same lines of sight.
+        Without a reference, or with one that has holes, it runs twice: along the fixes of the ranges there, and along
+        its own first solution, so that a game, whose reference is the clean run, has the same lines of sight.
         """
         run = self._clean_along(self.model)
+        if self.log.reference is None or not self.compared.all():
+            position, velocity = self._known(0, run.position[1:]), self._known(1, run.velocity[1:])
+            run = self._clean_along(replace(self.model, true_position=position, true_velocity=velocity))
         self._check_clean(run)
-        if self._truth is None:
-            run = self._clean_along(replace(self.model, true_position=run.position[1:], true_velocity=run.velocity[1:]))
         return run
 
     def _clean_along(self, model: StrapdownModel) -> TightCleanRun:
