@@ -17,11 +17,9 @@ from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.geodesy import position_difference
 from spoofgym.navigation.mechanization import mechanize
 from spoofgym.scenarios.log import interpolate
-from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.simulation import Simulation
 
-SETTLING = 30.0
-"""Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
 SAME_TIME = 1e-3
 """A reference epoch this close to a fix, s, is that fix and no independent check."""
 

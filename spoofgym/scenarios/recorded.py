@@ -30,6 +30,7 @@ from spoofgym.scenarios.range_epochs import range_epochs
 from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
+from spoofgym.scenarios.reference import check_reference
 from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
@@ -207,11 +208,13 @@ def recorded(
     if coupling == "tight":
         epochs = range_epochs(log)
         log = replace(log, fixes=epochs.fixes)
+        check_reference(log)
         return RecordedRanges(
             name=name, log=log, grade=imu, tuning=tuning, epochs=epochs, onset=onset, horizon=horizon
         )
     if fixes == "ranges":
         log = replace(log, fixes=range_fixes(log))
+    check_reference(log)
     if velocity is False or (velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
     return RecordedFixes(

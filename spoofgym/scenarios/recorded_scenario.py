@@ -18,11 +18,17 @@ from spoofgym.scenario import Scenario
 from spoofgym.scenarios.alignment import Alignment, align
 from spoofgym.scenarios.clean_run import CleanRun
 from spoofgym.scenarios.log import Log, covered, interpolate
+from spoofgym.scenarios.log_warning import warn
 from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import ImuGrade
 
 MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""
+SETTLING = 30.0
+"""Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
+LARGEST_NIS = 2.0
+"""Mean NIS of a clean run per degree of freedom above which the log is doubted: a filter that believes its sigmas has
+1, and the process noise of recorded scenarios is so generous that good logs stay well below it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,8 +47,14 @@ class RecordedScenario(Scenario):
         horizon: epochs of the game; None = to the end of the log.
         drag_off_rate: largest rate of the spoofed position per axis, m/s.
         error_scale: metres of error that make a reward of 1.
+        doubts: what is likely wrong with a log on which the filter is bad.
     """
 
+    doubts = (
+        "fixes and IMU on different clocks (imu_delay_s, gnss_delay_s), an antenna far from the IMU "
+        "(antenna_lever_arm_m), a wrong mounting (imu_to_body_frd), sigmas of fixes that are too small (sigma_floor), "
+        "single wrong fixes, an IMU that is worse than its grade"
+    )
     fidelities = ("strapdown",)
     matched = False
     random = False
@@ -240,14 +252,26 @@ class RecordedScenario(Scenario):
         )
 
     def _check_clean(self, run: CleanRun) -> None:
-        """Refuse a clean run that went astray.
+        """Refuse a clean run that went astray, and warn of one whose innovations are too large.
 
         Raises:
             ValueError: its position is not finite.
+
+        Warns:
+            LogWarning: the mean NIS, from `SETTLING` after the alignment on, and likely reasons.
         """
         if not np.all(np.isfinite(run.position)):
-            raise ValueError(
-                f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade"
+            raise ValueError(f"scenario {self.name!r}: the filter diverges on this log; likely reasons: {self.doubts}")
+        settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
+        first = settled if settled < len(self.epoch_time) else 0
+        per_degree = run.nis_per_degree(first)
+        if per_degree > LARGEST_NIS:
+            worst = first + int(np.argmax(run.nis[first:]))
+            warn(
+                self.log.folder,
+                f"clean innovations are {np.sqrt(per_degree):.1f} times as large as the filter believes: mean NIS "
+                f"{np.mean(run.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; the "
+                f"largest is {run.nis[worst]:.3g} at {seconds(self.epoch_time[worst])} s; likely reasons: {self.doubts}",
             )
 
     @cached_property

@@ -53,6 +53,10 @@ class RecordedRanges(RecordedScenario):
         errors: what the filter believes of slow errors and of the clock; its noise of code and rate is not read.
     """
 
+    doubts = (
+        "range rates of the wrong sign or unit (range_rate_mps), wrong ranges or ephemerides, ranges and IMU on "
+        "different clocks (imu_delay_s), a wrong mounting (imu_to_body_frd), an IMU that is worse than its grade"
+    )
     coupling = "tight"
     offers = (INERTIAL_SOLUTION, RANGES)
     clock_rate = 4.0
