@@ -10,7 +10,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios.log import Fixes, Log
-from spoofgym.scenarios.range_fixes import RangeSolution, fixes_of, range_delay, solve_ranges
+from spoofgym.scenarios.range_fixes import RangeSolution, check_solved, fixes_of, range_delay, solve_ranges
 from spoofgym.scenarios.ranges_log import Ranges, correct, read_ranges
 from spoofgym.scenarios.table import has_table, seconds
 from spoofgym.sensors.geometry import SatelliteGeometry
@@ -82,9 +82,7 @@ def range_epochs(log: Log) -> RangeEpochs:
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) for a filter to take")
     ranges = steady(read_ranges(log.folder), str(log.folder))
     solution = solve_ranges(ranges, log.fixes.position[0])
-    number = int(solution.solved.sum())
-    if number < 2:
-        raise ValueError(f"log {str(log.folder)!r}: ranges must give a fix in 2 epochs or more, they do in {number}")
+    check_solved(log, ranges, solution)
     delay = range_delay(log, solution)
     position, velocity, clock, drift = _between_fixes(solution)
     corrected = correct(ranges, position, clock)

@@ -25,7 +25,9 @@ from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.warm_start import ERROR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import CleanRun, clean_run
-from spoofgym.scenarios.log import read_log, velocity_of
+from spoofgym.scenarios.lever_arm import with_velocity_at_imu
+from spoofgym.scenarios.log import Log, read_log, velocity_of
+from spoofgym.scenarios.log_warning import warn
 from spoofgym.scenarios.range_epochs import range_epochs
 from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
@@ -207,7 +209,7 @@ def recorded(
     log = read_log(path)
     if coupling == "tight":
         epochs = range_epochs(log)
-        log = replace(log, fixes=epochs.fixes)
+        log = replace(log, fixes=epochs.fixes, lever_arm=_no_arm(log))
         check_reference(log)
         return RecordedRanges(
             name=name, log=log, grade=imu, tuning=tuning, epochs=epochs, onset=onset, horizon=horizon
@@ -215,8 +217,20 @@ def recorded(
     if fixes == "ranges":
         log = replace(log, fixes=range_fixes(log))
     check_reference(log)
+    log = with_velocity_at_imu(log)
     if velocity is False or (velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
     return RecordedFixes(
         name=name, log=log, grade=imu, tuning=tuning, sigma_floor=sigma_floor, onset=onset, horizon=horizon
     )
+
+
+def _no_arm(log: Log) -> Floats:
+    """The lever arm of a filter that knows none, (3,), m, with a warning where the log has one."""
+    if log.lever_arm.any():
+        warn(
+            log.folder,
+            f"log.toml: coupling=tight does not know antenna_lever_arm_m and takes the antenna for the IMU: positions err "
+            f"by up to {np.linalg.norm(log.lever_arm):.1f} m",
+        )
+    return np.zeros(3)

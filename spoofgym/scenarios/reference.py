@@ -33,7 +33,7 @@ def check_reference(log: Log) -> None:
     if log.fixes.position_sigma is not None:
         sigma = float(np.median(np.hypot(*log.fixes.position_sigma[used, :2].T)))
     distance = float(np.median(np.hypot(*apart.T)))
-    if distance <= APART * max(sigma, LEAST_SIGMA):
+    if distance <= APART * max(sigma, LEAST_SIGMA) + float(np.linalg.norm(log.lever_arm)):
         return
     speed = np.square(velocity[:, :2]).sum()
     delay = float((apart * velocity[:, :2]).sum() / speed) if speed > 0.0 else 0.0
