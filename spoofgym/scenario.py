@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import position_difference
 from spoofgym.immutable import Immutable
 from spoofgym.navigation.adaptation import Adaptation
@@ -335,7 +336,7 @@ class SimulatedScenario(Scenario):
             dynamics.observation[first:last],
         )
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def warm_start(self, burn_in: int = 0) -> WarmStart:
         """Truth and filter just before epoch -burn_in.
 
@@ -352,7 +353,7 @@ class SimulatedScenario(Scenario):
         start = cold_start(self.grade, self.receiver, self.tuning, self.ranges)
         return warm_up(start, self._epochs(0, before), self.grade, self.receiver, self.tuning, self.ranges)
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """The game in the linear fidelity, from epoch -burn_in on, under the filter with constant R and Q."""
         first = self._first(burn_in)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline
@@ -176,7 +177,7 @@ class TightScenario(Scenario):
             )
         return first
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def tight_model(self, burn_in: int = 0) -> TightModel:
         """The game in the linear fidelity, from epoch -burn_in on, every range used."""
         first = self._first(burn_in)
@@ -217,7 +218,7 @@ class TightScenario(Scenario):
         satellites = self.geometry.position[first : first + len(times)]
         return TightStrapdownNavigator(inertial, model, satellites, num_runs, slices, demands)
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def _initial_factors(self, burn_in: int) -> tuple[Floats, Floats]:
         """Square roots of the covariance of the error, (n, n), and of the estimated biases, (6, 6)."""
         prior = self.tight_model(burn_in).prior_covariance

@@ -32,6 +32,8 @@ class CleanRun:
         position: latitude rad, longitude rad, height m, (E + 1, 3).
         bias: estimated, (E + 1, 6), rad/s and m/s².
         covariance: P, (E + 1, 15, 15).
+        nis: normalised innovation squared of each epoch, (E,).
+        degrees: of freedom of each, (E,).
     """
 
     attitude: Floats
@@ -39,6 +41,13 @@ class CleanRun:
     position: Floats
     bias: Floats
     covariance: Floats
+    nis: Floats
+    degrees: Floats
+
+    def nis_per_degree(self, first: int) -> float:
+        """Mean from an epoch on; about 1 where innovations are as large as the filter believes, 0 without any."""
+        degrees = float(self.degrees[first:].sum())
+        return float(self.nis[first:].sum()) / degrees if degrees > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +136,7 @@ def _coast(
 def _states(
     navigator: StrapdownNavigator, initial: Floats, deviation: Floats, *more: Callable[[], Floats]
 ) -> list[Floats]:
-    """Attitude, velocity, position, bias, P, and more, before the first epoch and after each, (E + 1, ...).
+    """Attitude, velocity, position, bias, P, (E + 1, ...), NIS and its degrees, (E,), and more, (E + 1, ...).
 
     Raises:
         FilterDivergedError: the filter diverges.
@@ -135,6 +144,7 @@ def _states(
     navigator.reset(np.array([0]), initial[None], RunStreams.from_seed(0, 1))
     use = Decision(np.ones(1, dtype=bool))
     states: list[list[Floats]] = []
+    nis, degrees = np.empty(len(deviation)), np.empty(len(deviation))
 
     def keep() -> None:
         parts = [navigator.attitude, navigator.velocity, navigator.position, navigator.bias, navigator.covariance]
@@ -142,11 +152,13 @@ def _states(
         states.append([part[0].copy() for part in parts])
 
     keep()
-    for measured in deviation:
+    for epoch, measured in enumerate(deviation):
         navigator.propagate()
-        navigator.innovate(measured[None])
+        innovation = navigator.innovate(measured[None])
+        nis[epoch], degrees[epoch] = innovation.nis[0], innovation.degrees[0]
         navigator.resolve(use)
         if navigator.diverged[0]:
             raise diverged_error(0, float(navigator.model.time[navigator.index[0]]))
         keep()
-    return [np.stack(part) for part in zip(*states, strict=True)]
+    parts = [np.stack(part) for part in zip(*states, strict=True)]
+    return [*parts[:5], nis, degrees, *parts[5:]]

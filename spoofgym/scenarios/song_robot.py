@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
+from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.navigation.credible import AuxiliaryRule, CredibleModel, CredibleNavigator
 from spoofgym.navigation.credible_filter import CredibleTuning, credible_linear_model, standing_start
 from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
@@ -172,7 +173,7 @@ class SongRobot(Scenario):
         start = self.onset - burn_in * self.receiver.interval
         return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def motion(self, burn_in: int = 0) -> PlanarMotion:
         """The truth at the odometer's samples, from one interval before epoch -burn_in on."""
         steps = (burn_in + 1 + self.horizon) * self.tuning.samples
@@ -194,7 +195,7 @@ class SongRobot(Scenario):
         position = self._at_epochs(self.motion().position)
         return position - position[0]
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """What offsets do to the filter from epoch -burn_in on, every fix used: exact."""
         return credible_linear_model(self.tuning, self.rule.anchoring != "free", self.times(burn_in))
