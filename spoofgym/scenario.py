@@ -8,6 +8,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import position_difference
 from spoofgym.navigation.adaptation import Adaptation
@@ -29,6 +30,7 @@ from spoofgym.sensors.range_fix import RangeFix, draw_fix_noise
 from spoofgym.sensors.receiver import Receiver, draw_noise
 from spoofgym.streams import RunStreams
 from spoofgym.trajectory import Trajectory
+from spoofgym.validation import written
 
 FIDELITIES = ("linear", "strapdown")
 ROUNDING = 1e-9
@@ -190,11 +192,11 @@ def check_game(timeline: Timeline, trajectory: Trajectory) -> None:
     first, last = 2 * interval, trajectory.time[-1] - horizon * interval
     if not first - ROUNDING <= onset <= last + ROUNDING:
         raise ValueError(
-            f"onset {onset:g} s with a horizon of {horizon} epochs does not fit the trajectory of "
-            f"{trajectory.time[-1]:g} s: valid from {first:g} to {last:g} s"
+            f"onset {written(onset)} s with a horizon of {horizon} epochs does not fit the trajectory of "
+            f"{written(trajectory.time[-1])} s: valid from {written(first)} to {written(last)} s"
         )
     if abs(onset / interval - round(onset / interval)) > 1e-9:
-        raise ValueError(f"onset {onset:g} s is no epoch of a receiver at {1.0 / interval:g} Hz")
+        raise ValueError(f"onset {written(onset)} s is no epoch of a receiver at {written(1.0 / interval)} Hz")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -239,10 +241,11 @@ class SimulatedScenario(Scenario):
 
     def __post_init__(self) -> None:
         check_game(self.timeline, self.trajectory)
-        if min(self.drag_off_rate) <= 0 or not self.error_scale > 0:
-            raise ValueError(
-                f"drag_off_rate and error_scale must be positive, got {self.drag_off_rate} and {self.error_scale}"
-            )
+        owner = f"scenario {self.name!r}"
+        for rate in validation.triple(owner, "drag_off_rate", self.drag_off_rate):
+            validation.above(owner, "drag_off_rate", rate)
+        validation.above(owner, "error_scale", self.error_scale)
+        validation.above(owner, "defender_scale", self.defender_scale)
         if len(self.tuning.measurement_sigma) != self.receiver.dimension:
             raise ValueError(
                 f"the filter expects fixes of dimension {len(self.tuning.measurement_sigma)}, the receiver gives "

@@ -29,6 +29,7 @@ from spoofgym.attacks.range_attack import LiuSpoofer
 from spoofgym.attacks.song_mix import SongMix
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
 from spoofgym.specification import Specification, build, unnest
+from spoofgym.validation import written
 
 
 def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> TrackingError:
@@ -99,7 +100,7 @@ def opponents(attacks: str | Attack | Sequence[str | Attack], clean: float) -> A
         return copy.deepcopy(attacks)
     if isinstance(attacks, str) and Specification.parse(attacks).name in POPULATIONS:
         if "clean" in Specification.parse(attacks).options:
-            raise ValueError(f"the share of clean games is given by clean={clean:g}, not in {attacks!r}")
+            raise ValueError(f"the share of clean games is given by clean={written(clean)}, not in {attacks!r}")
         pool = make_attack(f"{attacks},clean={float(clean)!r}")
         assert isinstance(pool, AttackPool)
         return pool

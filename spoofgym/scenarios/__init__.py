@@ -47,7 +47,9 @@ def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scen
             of the other coupling.
     """
     if coupling is None:
-        return scenario if isinstance(scenario, Scenario) else _build(scenario)
+        if isinstance(scenario, Scenario):
+            return scenario
+        return _build(scenario) if isinstance(scenario, str) else build(scenario, SCENARIOS, "scenario")
     validation.one_of("scenario", "coupling", coupling, COUPLINGS)
     made = _build(_with_coupling(scenario, coupling)) if isinstance(scenario, str) else make_scenario(scenario)
     if made.coupling != coupling:

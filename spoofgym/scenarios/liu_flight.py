@@ -13,8 +13,9 @@ from functools import lru_cache
 from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenarios.limits import MOST_EPOCHS, RATES, SIGMAS
 from spoofgym.sensors.constellation import gps_24
-from spoofgym.sensors.imu import grade
+from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import MASK, range_fix_along
 from spoofgym.sensors.ranging import LIU
 from spoofgym.sensors.receiver import ZERO, Receiver
@@ -110,7 +111,13 @@ def liu_flight(
     owner = "liu-flight"
     validation.one_of(owner, "noise", noise, NOISES)
     validation.one_of(owner, "coupling", coupling, COUPLINGS)
-    validation.above(owner, "sigma", sigma)
+    require_grade(owner, "imu", imu)
+    horizon = validation.whole(owner, "horizon", horizon, 1, MOST_EPOCHS)
+    onset = validation.above(owner, "onset", onset)
+    rate = validation.between(owner, "rate", rate, *RATES)
+    sigma = validation.between(owner, "sigma", sigma, *SIGMAS)
+    markov_sigma = validation.non_negative(owner, "markov_sigma", markov_sigma, SIGMAS[1])
+    markov_time = validation.non_negative(owner, "markov_time", markov_time)
     usual = DRAG_OFF_RATES[coupling]
     fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
     limits = (
