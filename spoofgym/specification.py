@@ -81,9 +81,9 @@ def nest(text: str) -> str:
     return text.translate(NESTED)
 
 
-def unnest(text: str) -> str:
-    """The specification that `nest` wrote."""
-    return text.translate(UNNESTED)
+def unnest(text: Any) -> Any:
+    """The specification that `nest` wrote; what is no text stays as it is, and is refused where it is built."""
+    return text.translate(UNNESTED) if isinstance(text, str) else text
 
 
 def spell(name: str, value: object = None, **options: object) -> str:

@@ -66,6 +66,16 @@ def non_negative(owner: str, name: str, value: Any, largest: float = LARGEST) ->
     return _within(owner, name, wanted, number, 0.0, largest)
 
 
+def zero_or_above(owner: str, name: str, value: Any, largest: float = LARGEST) -> float:
+    """The value as zero, or as a finite number of `SMALLEST` or more: one that divides where it is not zero.
+
+    Raises:
+        ValueError: it is not.
+    """
+    number = non_negative(owner, name, value, largest)
+    return above(owner, name, number, largest=largest) if number else 0.0
+
+
 def non_negatives(owner: str, name: str, values: Any) -> Floats:
     """The values, of any shape, as finite numbers of zero or more.
 

@@ -72,9 +72,7 @@ class FusionRipper(FixedOffsets):
         limit: float = LIMIT,
         onset: float | None = None,
     ) -> None:
-        self.d = validation.non_negative("fusion-ripper", "d", d)
-        if self.d:
-            validation.above("fusion-ripper", "d", self.d)
+        self.d = validation.zero_or_above("fusion-ripper", "d", d)
         self.f = validation.finite("fusion-ripper", "f", f)
         if self.f < 1.0:
             raise ValueError(f"fusion-ripper: f must be 1 or more, got {f!r}")

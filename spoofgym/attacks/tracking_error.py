@@ -48,7 +48,7 @@ class TrackingError(AroundAttack):
             raise ValueError(f"tracking-error: attack must have no tracking error of its own, got {attack.name!r}")
         super().__init__(attack)
         self.sigma = validation.non_negative("tracking-error", "sigma", sigma, MOST_SIGMA)
-        self.time = validation.non_negative("tracking-error", "time", time)
+        self.time = validation.zero_or_above("tracking-error", "time", time)
         self.axis = None if axis is None else validation.one_of("tracking-error", "axis", axis, AXES)
         self._errs = np.array([axis in (None, name) for name in AXES])
 

@@ -97,7 +97,12 @@ class Acna(Detector):
         position: str = "innovation",
     ) -> None:
         self.jump_epochs = validation.epochs("acna", "jump_epochs", jump_epochs, 2)
-        self.slow_epochs = validation.epochs("acna", "slow_epochs", slow_epochs, self.jump_epochs + 1)
+        self.slow_epochs = validation.epochs("acna", "slow_epochs", slow_epochs, 3)
+        if self.slow_epochs <= self.jump_epochs:
+            raise ValueError(
+                f"acna: slow_epochs must be a whole number, {self.jump_epochs + 1} or more, got {self.slow_epochs}: "
+                f"more than jump_epochs = {self.jump_epochs}"
+            )
         self.memory = self.slow_epochs - 1
         validation.at_most_one("acna", jump_threshold=jump_threshold, preset=preset, arl0=arl0)
         validation.at_most_one("acna", slow_threshold=slow_threshold, preset=preset, arl0=arl0)

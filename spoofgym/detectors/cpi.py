@@ -123,7 +123,8 @@ class Cpi(Detector):
         elif threshold is not None:
             self.threshold = validation.above("cpi", "threshold", threshold)
         else:
-            self.threshold = cpi_theory.cpi_threshold(DEFAULT_P_FA if p_fa is None else p_fa, self.n)
+            p_exceeds = validation.probability("cpi", "p_fa", DEFAULT_P_FA if p_fa is None else p_fa)
+            self.threshold = cpi_theory.cpi_threshold(p_exceeds, self.n)
         self._name = spell(
             "cpi",
             n=None if self.n == DEFAULT_WINDOW else self.n,

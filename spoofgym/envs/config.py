@@ -111,7 +111,7 @@ class SpooferConfig:
             frames=validation.whole(owner, "frames", self.frames, 1, MOST_FRAMES),
             forfeit=validation.non_negative(owner, "forfeit", self.forfeit, MOST_WEIGHT),
             tracking_sigma=validation.non_negative(owner, "tracking_sigma", self.tracking_sigma, MOST_WEIGHT),
-            tracking_time=validation.non_negative(owner, "tracking_time", self.tracking_time),
+            tracking_time=validation.zero_or_above(owner, "tracking_time", self.tracking_time),
             threads=validation.threads(owner, self.threads),
         )
 

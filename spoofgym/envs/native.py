@@ -158,7 +158,7 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             first = validation.seed(owner, seed)
             seeds = [None if first is None else first + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
+            raise ValueError(f"{owner}: seed must be one number or {self.num_envs} of them, got {len(seeds)}")
         for lane in lanes:
             if seeds[lane] is not None or self._generators[lane] is None:
                 generator, _ = seeding.np_random(seeds[lane])

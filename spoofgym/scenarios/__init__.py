@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 from spoofgym import validation
 from spoofgym.scenario import Scenario
@@ -34,6 +35,13 @@ def _build(text: str) -> Scenario:
     return build(text, SCENARIOS, "scenario")
 
 
+def _made(scenario: Any) -> Scenario:
+    """From the cache what a text names; what is neither text nor scenario is refused."""
+    if isinstance(scenario, Scenario):
+        return scenario
+    return _build(scenario) if isinstance(scenario, str) else build(scenario, SCENARIOS, "scenario")
+
+
 def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scenario:
     """The scenario that a specification names; an object is returned as it is.
 
@@ -47,9 +55,7 @@ def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scen
             of the other coupling.
     """
     if coupling is None:
-        if isinstance(scenario, Scenario):
-            return scenario
-        return _build(scenario) if isinstance(scenario, str) else build(scenario, SCENARIOS, "scenario")
+        return _made(scenario)
     validation.one_of("scenario", "coupling", coupling, COUPLINGS)
     made = _build(_with_coupling(scenario, coupling)) if isinstance(scenario, str) else make_scenario(scenario)
     if made.coupling != coupling:

@@ -118,7 +118,7 @@ def shadmehri_flight(
         ),
         tuning=FilterTuning(measurement_sigma=SIGMA),
         onset=start,
-        horizon=round((DURATION - start) * rate),
+        horizon=math.floor((DURATION - start) * rate + 1e-6),
         drag_off_rate=(5.0, 5.0, 5.0),
         error_scale=10.0,
         defender_scale=10.0,

@@ -16,7 +16,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
 from spoofgym.attacks import ATTACKS, make_attack
@@ -27,7 +26,7 @@ from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
-from spoofgym.navigation.interface import Decision
+from spoofgym.navigation.facts import RANGES
 from spoofgym.parallel import RunSlices
 from spoofgym.responses import RESPONSES, make_response
 from spoofgym.responses.base import Response
@@ -37,6 +36,8 @@ from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
 
 LOOSE, TIGHT, LONG = "liu-flight:horizon=12", "kujur-flight:horizon=12,onset=60", "foi-drive:horizon=30"
+UNMATCHED = "foi-drive:receiver=foi,onset=60,horizon=12"
+LONG_TIGHT = "kujur-flight:horizon=60,onset=60"
 STEPS = 4
 REFUSED = (ValueError, TypeError)
 
@@ -47,15 +48,17 @@ NUMBERS: tuple[Any, ...] = (
     np.array(2.0), np.array(float("nan")), np.array([1.0, 2.0]), np.array([]), Decimal("2"), Decimal("NaN"),
 )  # fmt: skip
 OTHERS: tuple[Any, ...] = (
-    True, False, np.bool_(True), None, "", " ", "x", "90", "nan", "1e300", "\0", "x" * 10_000, "9" * 5000, b"5", [], [1],
-    [[]], (), (1, 2), {}, {"a": 1}, set(), 1j, np.complex128(1 + 1j), np.array(1j), np.array(["x"]),
+    True, False, np.bool_(True), None, "", " ", "x", "90", "nan", "1e300", "\0", "x" * 10_000, "9" * 5000, b"5", [],
+    [1], [[]], (), (1, 2), {}, {"a": 1}, set(), 1j, np.complex128(1 + 1j), np.array(1j), np.array(["x"]),
     np.array([None, 1], dtype=object), object(), int, range(3), len, np.datetime64("2020-01-01"), Ellipsis,
 )  # fmt: skip
 TEXTS = (
-    "nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "5e-324", "1e400", "-1", "-0", "0", "0.5", "1", "2", "1e9", "1e19",
-    "99999999", "100001", "9" * 5000, "0x10", "1_0", "true", "false", "none", "x", "é", "٣", "x" * 5000, "1+1", "5+20",
-    "a/b", "~", "+", "/", "ramp/1", "ramp:nan", "ramp:1e300", "ramp:1/onset=1e9", "snapshot+windowed", "'", "\\", "\t", "",
+    "nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "5e-324", "1e400", "-1", "-0", "0", "0.5", "1", "2", "1e9",
+    "1e19", "99999999", "100001", "9" * 5000, "0x10", "1_0", "true", "false", "none", "x", "é", "٣", "x" * 5000, "1+1",
+    "5+20", "a/b", "~", "+", "/", "ramp/1", "ramp:nan", "ramp:1e300", "ramp:1/onset=1e9",
+    "snapshot+windowed", "'", "\\", "\t", "",
 )  # fmt: skip
+EXPONENTS = ((-300, 300), (-12, 12), (-6, 6), (-2, 2))
 ACTIONS: tuple[Any, ...] = (
     None, "x", "", b"1", object(), [], {}, True, 1j, 1e19, 1e300, float("nan"), float("inf"), 10**30, -1, 0.5, 99,
     np.float32(np.inf), np.longdouble("1e4000"), np.uint64(2**63),
@@ -102,7 +105,8 @@ def broken_promise(attempt: Try) -> str | None:
         message = str(error)
         if _names(message, attempt.owners) and _names(message, attempt.arguments):
             return None
-        return f"{attempt.words}: {type(error).__name__} that does not name {attempt.owners} and {attempt.arguments}: {message[:300]}"
+        wanted = f"{attempt.owners} and {attempt.arguments}"
+        return f"{attempt.words}: {type(error).__name__} that does not name {wanted}: {message[:300]}"
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
             raise
@@ -120,22 +124,24 @@ def _names(message: str, names: tuple[str, ...]) -> bool:
 def hostile(rng: np.random.Generator) -> Any:
     """A value that nobody would give on purpose, or hardly."""
     kind = rng.random()
-    if kind < 0.45:
+    if kind < 0.35:
         return NUMBERS[int(rng.integers(len(NUMBERS)))]
-    if kind < 0.7:
+    if kind < 0.55:
         return OTHERS[int(rng.integers(len(OTHERS)))]
-    if kind < 0.85:
-        return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-300, 300))
-    if kind < 0.95:
-        return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-12, 12))
-    return int(rng.integers(-1000, 1000))
+    if kind < 0.75:
+        return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*EXPONENTS[int(rng.integers(len(EXPONENTS)))]))
+    if kind < 0.9:
+        return float(10.0 ** rng.uniform(-9, 9))
+    return int(rng.integers(-10, 1000))
 
 
 def hostile_text(rng: np.random.Generator) -> str:
     """A text that nobody would write after ``key=``."""
     if rng.random() < 0.6:
         return TEXTS[int(rng.integers(len(TEXTS)))]
-    return repr(float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*((-300, 300) if rng.random() < 0.5 else (-6, 6)))))
+    if rng.random() < 0.3:
+        return str(int(rng.integers(-2, 1000)))
+    return repr(float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*EXPONENTS[int(rng.integers(len(EXPONENTS)))])))
 
 
 def _shown(value: object) -> str:
@@ -147,6 +153,12 @@ def _shown(value: object) -> str:
 
 # --- parts ------------------------------------------------------------------------------------------------------------
 
+MAKERS: dict[str, Callable[[Any], Any]] = {
+    "attack": make_attack,
+    "detector": make_detector,
+    "response": make_response,
+    "scenario": make_scenario,
+}
 KINDS: dict[str, tuple[dict[str, Callable[..., Any]], Callable[[Any], None]]] = {}
 
 
@@ -161,13 +173,13 @@ def _parts(rng: np.random.Generator) -> Try:
     keys = [parameters[int(place)].name for place in chosen]
     played = play if _fits(kind, name) else _nothing
     if rng.random() < 0.5:
-        options = {p.name: _example(name, p) for p in parameters if p.default is p.empty}
+        options = {p.name: _example(p) for p in parameters if p.default is p.empty}
         options |= {key: hostile_text(rng) for key in keys}
         text = f"{name}:" + ",".join(f"{key}={value}" for key, value in options.items())
-        makers = {"attack": make_attack, "detector": make_detector, "response": make_response, "scenario": make_scenario}
+        named = (*keys, "specification", "member")
         owners = (name, "specification", *_inner(name))
-        return Try(f"{kind} {text[:150]!r}", owners, (*keys, "specification"), lambda: makers[kind](text), played)
-    given = {p.name: _example(name, p, objects=True) for p in parameters if p.default is p.empty}
+        return Try(f"{kind} {text[:150]!r}", owners, named, lambda: MAKERS[kind](text), played)
+    given = {p.name: _example(p) for p in parameters if p.default is p.empty}
     given |= {key: hostile(rng) for key in keys}
     words = f"{kind} {name}({', '.join(f'{key}={_shown(value)}' for key, value in given.items())})"
     return Try(words, (name, *_inner(name)), tuple(keys), lambda: factory(**given), played)
@@ -175,17 +187,18 @@ def _parts(rng: np.random.Generator) -> Try:
 
 def _inner(name: str) -> tuple[str, ...]:
     """Owners that answer for the options of a part which they make up, or from which it is made."""
-    return {"ci": ("windowed",), "kujur-monitor": ("cpi", "separation-bank")}.get(name, ()) + tuple(
-        {"training": ("random-ramp", "pool of attacks"), "held-out": ("two-stage-ramp", "pool of attacks")}.get(name, ())
-    )
+    within = {
+        "ci": ("windowed",),
+        "kujur-monitor": ("cpi", "separation-bank"),
+        "training": ("random-ramp", "pool of attacks"),
+        "held-out": ("two-stage-ramp", "pool of attacks"),
+    }
+    return within.get(name, ())
 
 
-def _example(name: str, parameter: inspect.Parameter, *, objects: bool = False) -> Any:
+def _example(parameter: inspect.Parameter) -> Any:
     """A good value of a parameter that must be given."""
-    examples = {"attack": "ramp:1", "members": "snapshot+rio", "path": "."}
-    if parameter.name in examples:
-        return examples[parameter.name]
-    return 2.0
+    return {"attack": "ramp:1", "members": "snapshot+rio"}.get(parameter.name, 2.0)
 
 
 @cache
@@ -194,7 +207,7 @@ def _fits(kind: str, name: str) -> bool:
     registry, play = KINDS[kind]
     parameters = inspect.signature(registry[name]).parameters.values()
     try:
-        play(registry[name](**{p.name: _example(name, p) for p in parameters if p.default is p.empty}))
+        play(registry[name](**{p.name: _example(p) for p in parameters if p.default is p.empty}))
     except ValueError:
         return False
     return True
@@ -207,8 +220,8 @@ def _nothing(part: Any) -> None:
 def _run(simulation: Simulation) -> None:
     """A few epochs, all of whose numbers are finite."""
     simulation.reset()
-    for step in range(min(STEPS, simulation.scenario.timeline.num_epochs)):
-        simulation.resolve(None if simulation.response is not None or step else Decision(np.ones(simulation.num_runs, bool)))
+    for _ in range(min(STEPS, simulation.scenario.timeline.num_epochs)):
+        simulation.resolve()
         epoch = simulation.observe()
         for values in (simulation.error, epoch.innovation.nis, *epoch.statistics.values(), simulation.offset):
             assert np.all(np.isfinite(values)), "a number that is not finite"
@@ -220,7 +233,7 @@ def _play_attack(attack: Attack) -> None:
 
 
 def _play_detector(detector: Detector) -> None:
-    scenario = make_scenario(TIGHT if "satellite ranges" in detector.needs or "ranges" in detector.needs else LOOSE)
+    scenario = make_scenario(TIGHT if RANGES in detector.needs else LOOSE if detector.memory > 20 else UNMATCHED)
     for member in (*detector.members, detector):
         if member.lacks_slope:
             member.set_slope(0.0)
@@ -253,7 +266,7 @@ ENVIRONMENTS: tuple[tuple[type, type, dict[str, Any]], ...] = (
     (DefenderEnv, DefenderConfig, {"scenario": LONG, "detectors": "snapshot"}),
     (DefenderVectorEnv, DefenderConfig, {"scenario": LONG, "detectors": "snapshot", "num_envs": 2}),
     (SpooferEnv, SpooferConfig, {"scenario": TIGHT}),
-    (DefenderVectorEnv, DefenderConfig, {"scenario": "kujur-flight:horizon=60,onset=60", "detectors": "snapshot", "num_envs": 2}),
+    (DefenderVectorEnv, DefenderConfig, {"scenario": LONG_TIGHT, "detectors": "snapshot", "num_envs": 2}),
 )
 OF_VECTORS = ("num_envs", "autoreset_mode", "max_episode_steps")
 
@@ -282,6 +295,8 @@ def _environments(rng: np.random.Generator) -> Try:
     value = hostile(rng)
     if isinstance(value, str) and key in ("scenario", "shadow", "detector", "detectors", "attacks", "response"):
         value = hostile_text(rng)
+    if key == "num_envs" and isinstance(value, int | float) and 20 < value < 100_000:
+        value = 20  # more lanes are only slower
     arguments = {**given, key: value}
     owners = (*_owners(kind), "scenario", "action") if key in ("fidelity", "shadow") else _owners(kind)
     words = f"{kind.__name__}({', '.join(f'{name}={_shown(item)}' for name, item in arguments.items())})"
@@ -321,19 +336,18 @@ def _actions(rng: np.random.Generator) -> Try:
             except (ValueError, TypeError):
                 action = np.array(action, dtype=object)
     elif rng.random() < 0.5:
-        action = np.zeros((int(rng.integers(4)),) * int(rng.integers(4)), dtype=rng.choice(["f8", "i8", "c16", "?", "U3"]))
+        shape = (int(rng.integers(4)),) * int(rng.integers(4))
+        action = np.zeros(shape, dtype=str(rng.choice(["f8", "i8", "c16", "?", "U3"])))
     else:
         action = value
     words = f"{ENVIRONMENTS[place][0].__name__}.step({_shown(action)})"
-    discrete = isinstance(env.action_space, spaces.MultiDiscrete)
 
     def play(_: Any) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             observation, reward, *_rest = env.step(action)
-        assert np.all(np.isfinite(observation)) and np.all(np.isfinite(reward)), "a number that is not finite"
-        if discrete:
-            assert env.action_space.shape == np.shape(action)
+        assert np.all(np.isfinite(observation)), "an observation that is not finite"
+        assert np.all(np.isfinite(reward)), "a reward that is not finite"
 
     return Try(words, ("action", "actions"), ("action", "actions"), lambda: None, play)
 
@@ -345,10 +359,14 @@ def _simulate(**arguments: Any) -> Simulation:
     return Simulation(make_scenario(LOOSE), None, [make_detector("snapshot")], **arguments)
 
 
+def _streams(**arguments: Any) -> RunStreams:
+    return RunStreams.from_seed(**{"seed": 1, "num_runs": 2, **arguments})
+
+
 OTHER_CALLABLES: tuple[tuple[Callable[..., Any], tuple[str, ...], tuple[str, ...], Callable[[Any], None]], ...] = (
     (_simulate, ("Simulation", "scenario"), ("num_runs", "seed", "threads", "fidelity", "response", "attack"), _run),
     (RunSlices, ("slices of runs",), ("threads",), _nothing),
-    (lambda **given: RunStreams.from_seed(**{"seed": 1, "num_runs": 2, **given}), ("random streams",), ("seed", "num_runs"), _nothing),
+    (_streams, ("random streams",), ("seed", "num_runs"), _nothing),
 )
 
 
