@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Runs
 
 
@@ -23,11 +24,9 @@ class RunSlices:
         """Use up to ``threads`` threads.
 
         Raises:
-            ValueError: ``threads`` is less than 1.
+            ValueError: ``threads`` is no whole number from 1 to 1024.
         """
-        if threads < 1:
-            raise ValueError(f"threads must be 1 or more, got {threads}")
-        self.threads = threads
+        self.threads = validation.threads("slices of runs", threads)
         self._pool: ThreadPoolExecutor | None = None
         self._process: int | None = None
 

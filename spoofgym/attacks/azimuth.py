@@ -12,6 +12,7 @@ from spoofgym.attacks.base import Attack
 from spoofgym.attacks.fixed_offsets import FixedOffsets
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
+from spoofgym.validation import written
 
 DECAY = 45.0
 """Length of the decay, s, where the attack lasts so long. The report's table leaves it out; with it the parallel run of
@@ -65,10 +66,10 @@ class Azimuth(FixedOffsets):
         self.azimuth = validation.above("azimuth", "azimuth", azimuth)
         self.growth = validation.above("azimuth", "growth", growth)
         self.decay = validation.above("azimuth", "decay", decay)
-        self.onset = None if onset is None else validation.finite("azimuth", "onset", onset)
-        self.end = None if end is None else validation.finite("azimuth", "end", end)
+        self.onset = None if onset is None else validation.time("azimuth", "onset", onset)
+        self.end = None if end is None else validation.time("azimuth", "end", end)
         if self.end is not None and self.onset is not None and self.end <= self.onset:
-            raise ValueError(f"azimuth: end must be later than the onset at {self.onset:g} s, got {end!r}")
+            raise ValueError(f"azimuth: end must be later than the onset at {written(self.onset)} s, got {end!r}")
 
     @property
     def name(self) -> str:
@@ -90,7 +91,7 @@ class Azimuth(FixedOffsets):
         """
         super().bind(timeline, num_runs)
         if self.end is not None and self.end <= self._onset:
-            raise ValueError(f"azimuth: end must be later than the onset at {self._onset:g} s, got {self.end!r}")
+            raise ValueError(f"azimuth: end must be later than the onset at {written(self._onset)} s, got {self.end!r}")
         self._end = timeline.end if self.end is None else self.end
 
     def follow(self, velocity: Floats) -> None:
@@ -139,8 +140,7 @@ class FoiScenario(Azimuth):
     """
 
     def __init__(self, number: int) -> None:
-        if number not in FOI_SCENARIOS:
-            raise ValueError(f"foi: number must be from 1 to {len(FOI_SCENARIOS)}, got {number!r}")
+        number = validation.whole("foi", "number", number, 1, len(FOI_SCENARIOS))
         onset, end, growth, azimuth = FOI_SCENARIOS[number]
         super().__init__(azimuth, growth, onset, end)
         self.number = number

@@ -8,6 +8,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.fixed_offsets import FixedOffsets
 from spoofgym.specification import spell
+from spoofgym.validation import written
 
 SCALE = 1.2
 WAIT = 10.0
@@ -71,7 +72,7 @@ class FusionRipper(FixedOffsets):
         limit: float = LIMIT,
         onset: float | None = None,
     ) -> None:
-        self.d = validation.non_negative("fusion-ripper", "d", d)
+        self.d = validation.zero_or_above("fusion-ripper", "d", d)
         self.f = validation.finite("fusion-ripper", "f", f)
         if self.f < 1.0:
             raise ValueError(f"fusion-ripper: f must be 1 or more, got {f!r}")
@@ -79,8 +80,8 @@ class FusionRipper(FixedOffsets):
         self.side = validation.one_of("fusion-ripper", "side", side, SIDES)
         self.limit = validation.finite("fusion-ripper", "limit", limit)
         if self.limit < self.d:
-            raise ValueError(f"fusion-ripper: limit must be d = {self.d:g} m or more, got {limit!r}")
-        self.onset = None if onset is None else validation.finite("fusion-ripper", "onset", onset)
+            raise ValueError(f"fusion-ripper: limit must be d = {written(self.d)} m or more, got {limit!r}")
+        self.onset = None if onset is None else validation.time("fusion-ripper", "onset", onset)
 
     @property
     def name(self) -> str:

@@ -50,8 +50,8 @@ class Meaconing(FixedOffsets):
 
     def __init__(self, delay: float, ramp_up: float = 0.0, onset: float | None = None) -> None:
         self.delay = validation.non_negative("meaconing", "delay", delay)
-        self.ramp_up = validation.non_negative("meaconing", "ramp_up", ramp_up)
-        self.onset = None if onset is None else validation.finite("meaconing", "onset", onset)
+        self.ramp_up = validation.zero_or_above("meaconing", "ramp_up", ramp_up)
+        self.onset = None if onset is None else validation.time("meaconing", "onset", onset)
 
     @property
     def name(self) -> str:

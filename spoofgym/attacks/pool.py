@@ -94,6 +94,11 @@ class AttackPool(Attack):
             if member.needs_model:
                 member.study(model)
 
+    def meet(self, satellites: Runs) -> None:
+        """Tell every member the numbers of the satellites in the game."""
+        for member in self._members:
+            member.meet(satellites)
+
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the opponents of new episodes, and all that these will do."""
         draws = np.array([streams(run, "opponent").random(2) for run in runs.tolist()])

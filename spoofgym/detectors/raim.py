@@ -62,7 +62,7 @@ class Raim(Detector):
         validation.at_most_one("raim", threshold=threshold, p_fa=p_fa, arl0=arl0)
         self._given = None if threshold is None else validation.above("raim", "threshold", threshold)
         self._p_fa = None if p_fa is None else validation.probability("raim", "p_fa", p_fa)
-        self.target_arl0 = None if arl0 is None else validation.above("raim", "arl0", arl0, 1.0)
+        self.target_arl0 = None if arl0 is None else validation.average_run_length("raim", "arl0", arl0)
         self.threshold = self._given
         self._name = spell("raim", threshold=self._given, p_fa=self._p_fa, arl0=self.target_arl0)
 

@@ -48,7 +48,7 @@ class RampBank(ThresholdDetector):
     needs = (LINEAR_MODEL,)
 
     def __init__(self, length: int = DEFAULT_LENGTH, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.length = validation.whole(self.kind, "length", length, 1)
+        self.length = validation.epochs(self.kind, "length", length, 1, validation.LONGEST_TABLE)
         self.memory = self.length - 1
         self.set_up(threshold, arl0, length=self.length)
 

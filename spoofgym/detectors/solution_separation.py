@@ -50,7 +50,7 @@ class SolutionSeparation(ThresholdDetector):
     needs = (LINEAR_MODEL,)
 
     def __init__(self, n: int = DEFAULT_WINDOW, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
         self.memory = self.n - 1
         self.set_up(threshold, arl0, n=self.n)
 

@@ -51,8 +51,8 @@ class Whiteness(ThresholdDetector):
         threshold: float | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole(self.kind, "n", n, 2)
-        self.lags = validation.whole(self.kind, "lags", lags, 1)
+        self.n = validation.epochs(self.kind, "n", n, 2)
+        self.lags = validation.epochs(self.kind, "lags", lags, 1)
         if self.lags >= self.n:
             raise ValueError(f"{self.kind}: lags must be less than n = {self.n}, got {lags!r}")
         self.memory = self.n - 1

@@ -11,11 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.cpi_theory import kappa
+from spoofgym.envs.actions import rates
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
 from spoofgym.envs.observation import AXES, Squash, observation_space, spoofer_fields
@@ -29,6 +31,9 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 
+OWNER = "Spoofer-v0"
+MOST_ENTRIES = 2**28
+"""Of the observations of all lanes: a gigabyte."""
 INNOVATION_UNIT = 4.0
 """One unit of the innovation action, in sigma per axis."""
 
@@ -79,7 +84,8 @@ class SpooferGame:
             ValueError: a part that is unknown or does not fit the scenario.
         """
         self.config = config
-        scenario = make_scenario(config.scenario, config.coupling)
+        with validation.argument(OWNER, "scenario"):
+            scenario = make_scenario(config.scenario, config.coupling)
         self._ranges = scenario.coupling == "tight"
         if self._ranges and config.action == "innovation":
             raise ValueError(
@@ -87,12 +93,14 @@ class SpooferGame:
                 "offset provokes any innovation of the ranges; use action='rate'"
             )
         given = config.detector if isinstance(config.detector, tuple | list) else (config.detector,)
-        # copies: an object that the caller gives to two environments must not carry memories from one to the other
-        detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
+        with validation.argument(OWNER, "detector"):
+            # copies: an object that the caller gives to two environments must not carry memories between them
+            detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
         names = [detector.name for detector in detectors]
         if len(set(names)) < len(names):
             raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
-        response: Response | None = deepcopy(make_response(config.response))
+        with validation.argument(OWNER, "response"):
+            response: Response | None = deepcopy(make_response(config.response))
         if config.on_alarm == "end":
             response = None
         self.simulation = Simulation(
@@ -109,11 +117,17 @@ class SpooferGame:
         self.num_lanes = num_lanes
         self.shadow: ShadowFilter | TightShadowFilter | None = None
         if config.knowledge != "blind":
-            believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
-            self.shadow = self._shadow_filter(believed)
+            with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):
+                believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
+                self.shadow = self._shadow_filter(believed)
         dimension = 3 if self._ranges else scenario.dimension
         fields = spoofer_fields(config.knowledge, dimension, tuple(self.simulation.detectors), self._ranges)
         self.fields = stacked_fields(fields, config.frames)
+        if num_lanes * len(self.fields) > MOST_ENTRIES:
+            raise ValueError(
+                f"{OWNER}: frames times num_envs must leave {MOST_ENTRIES} entries of observations at most, got frames="
+                f"{config.frames} with num_envs={num_lanes}"
+            )
         self.observation_space = observation_space(self.fields)
         rates = (*scenario.drag_off_rate, scenario.clock_rate) if self._ranges else scenario.drag_off_rate
         self.action_space = spaces.Box(-1.0, 1.0, (len(rates),), np.float32)
@@ -184,14 +198,9 @@ class SpooferGame:
             restarting: indices of lanes.
 
         Raises:
-            ValueError: an action is NaN or infinite, or has the wrong shape.
+            ValueError: an action is not finite or no number, or the actions have the wrong shape.
         """
-        actions = np.asarray(actions, dtype=np.float64)
-        if actions.shape != self.offset.shape:
-            raise ValueError(f"actions must have shape {self.offset.shape}, got {actions.shape}")
-        if not np.isfinite(actions).all():
-            lane = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
-            raise ValueError(f"action of lane {lane} is not finite: {actions[lane]}")
+        actions = rates(actions, self.offset.shape)
         simulation = self.simulation
         simulation.resolve()
         error = self._horizontal()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
-from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.evaluation.monte_carlo import batches, horizontal
 from spoofgym.navigation.interface import Decision, Demands, Timeline
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching
@@ -98,14 +98,6 @@ class World:
             demands=demands,
             confounders=Confounders(self.disturbances),
         )
-
-
-def _batches(episodes: int) -> Iterator[tuple[int, int]]:
-    """First episode and number of episodes of each batch."""
-    if episodes < 1:
-        raise ValueError(f"episodes must be 1 or more, got {episodes}")
-    for first in range(0, episodes, BATCH):
-        yield first, min(BATCH, episodes - first)
 
 
 def play_response(world: World, detector: str, response: Response, episodes: int, seed: int) -> DefenceEpisodes:
@@ -191,8 +183,8 @@ def _play(
     seed: int,
 ) -> DefenceEpisodes:
     parts = []
-    for first, count in _batches(episodes):
-        simulation = world.simulation(response, count, seed + first, demands)
+    for first, count in batches(episodes, seed, BATCH):
+        simulation = world.simulation(response, count, first, demands)
         simulation.reset()
         record = _Record(simulation)
         for k in range(world.scenario.timeline.num_epochs):
@@ -230,10 +222,10 @@ def play_policy(
         threads=world.threads,
     )
     parts = []
-    for first, count in _batches(episodes):
+    for first, count in batches(episodes, seed, BATCH):
         game = DefenderGame(config, count, world.detectors)
         game.confounders.disturbances = world.disturbances
-        game.simulation.streams = RunStreams.from_seed(seed + first, count)
+        game.simulation.streams = RunStreams.from_seed(first, count)
         game.reset(np.arange(count))
         record = _Record(game.simulation)
         for k in range(world.scenario.timeline.num_epochs):

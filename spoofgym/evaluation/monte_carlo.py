@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
@@ -88,12 +89,21 @@ def horizontal(error: Floats) -> Floats:
     return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
 
 
-def _batches(episodes: int) -> Iterator[tuple[int, int]]:
-    """First run and number of runs of each batch."""
-    if episodes < 1:
-        raise ValueError(f"episodes must be 1 or more, got {episodes}")
-    for first in range(0, episodes, BATCH):
-        yield first, min(BATCH, episodes - first)
+def batches(episodes: int, seed: int, size: int) -> Iterator[tuple[int, int]]:
+    """Seed of the first game and number of games of each batch.
+
+    Args:
+        episodes: games of all batches.
+        seed: of the first game of all.
+        size: games of a batch.
+
+    Raises:
+        ValueError: no games, or too many, or a seed that is no whole number, 0 or more.
+    """
+    episodes = validation.runs("evaluation", "episodes", episodes)
+    seed = validation.whole("evaluation", "seed", seed, 0, 2**62)
+    for first in range(0, episodes, size):
+        yield seed + first, min(size, episodes - first)
 
 
 class _Watch:
@@ -173,9 +183,9 @@ def watch_attack(
         ValueError: no episodes, or what `Simulation` refuses.
     """
     parts = []
-    for first, count in _batches(episodes):
+    for first, count in batches(episodes, seed, BATCH):
         simulation = Simulation(
-            scenario, attack, detectors, None, count, seed + first, fidelity=fidelity, threads=threads
+            scenario, attack, detectors, None, count, first, fidelity=fidelity, threads=threads
         )
         simulation.reset()
 
@@ -220,9 +230,9 @@ def watch_policy(
         seed: of game 0.
     """
     parts = []
-    for first, count in _batches(episodes):
+    for first, count in batches(episodes, seed, BATCH):
         game = make_game(count)
-        game.simulation.streams = RunStreams.from_seed(seed + first, count)
+        game.simulation.streams = RunStreams.from_seed(first, count)
         game.reset(np.arange(count))
 
         def advance(game: SpooferGame = game) -> None:

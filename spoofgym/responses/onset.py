@@ -26,7 +26,7 @@ class OnsetEstimator:
         Raises:
             ValueError: a window of less than one epoch.
         """
-        self.window = validation.whole("onset estimate", "window", window, 1)
+        self.window = validation.epochs("onset estimate", "window", window, 1)
         self._ring = np.zeros((num_runs, self.window, 2))
         self._place = np.zeros(num_runs, dtype=np.int64)
 

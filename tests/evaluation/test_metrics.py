@@ -98,5 +98,5 @@ def test_random_rates_stay_within_the_limits():
 
 
 def test_no_episodes_are_refused():
-    with pytest.raises(ValueError, match="episodes must be 1 or more, got 0"):
+    with pytest.raises(ValueError, match="episodes must be a whole number, 1 or more, got 0"):
         play_attack(make_scenario("liu-flight"), make_attack("none"), [make_detector("snapshot")], 0, 0)
