@@ -58,6 +58,8 @@ def test_a_result_comes_back_to_the_last_bit(place):
         '{"setting": {"threshold": -1.0}}',
         '{"setting": {"other": 1.0}}',
         b"\xff\xfe",
+        pytest.param("[" * 50_000, id="nested"),
+        pytest.param("1" * 50_000, id="digits"),
     ],
 )
 def test_a_damaged_file_is_none(place, content):
@@ -67,6 +69,65 @@ def test_a_damaged_file_is_none(place, content):
     assert calibration_cache.load(NAME) is None
     calibration_cache.store(NAME, SETTING, "")
     assert calibration_cache.load(NAME) == SETTING
+
+
+CHANGES = [
+    lambda text: text.replace("12.5", "13.5"),
+    lambda text: text.replace("12.5", "12.500000000000002"),
+    lambda text: text.replace("12.5", "NaN"),
+    lambda text: text.replace("12.5", '"12.5"'),
+    lambda text: text.replace("12.5", "null"),
+    lambda text: text.replace("1000.25", "1000"),
+    lambda text: text.replace('"slope"', '"low"'),
+    lambda text: text.replace("a remark", "another remark"),
+    lambda text: text.replace('"checksum"', '"sum"'),
+    lambda text: text[: len(text) // 2],
+    lambda text: text + text,
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=range(len(CHANGES)))
+def test_a_well_formed_file_that_was_changed_is_none(place, change):
+    calibration_cache.store(NAME, SETTING, "a remark")
+    path = place / f"{NAME}.json"
+    assert change(path.read_text()) != path.read_text()
+    path.write_text(change(path.read_text()))
+    assert calibration_cache.load(NAME) is None
+
+
+def test_every_character_counts(place):
+    """Each flipped in turn: the setting comes back as it was, or not at all."""
+    calibration_cache.store(NAME, SETTING, "a remark")
+    path = place / f"{NAME}.json"
+    whole = path.read_bytes()
+    for at in range(len(whole)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        assert calibration_cache.load(NAME) in (None, SETTING)
+        path.write_bytes(whole[:at])
+        assert calibration_cache.load(NAME) in (None, SETTING)
+
+
+def test_a_result_under_another_name_is_none(place):
+    calibration_cache.store(NAME, SETTING, "")
+    (place / f"{NAME}.json").rename(place / f"{'1' * 64}.json")
+    assert calibration_cache.load("1" * 64) is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [*CHANGES[-2:], lambda text: text.replace('"threshold": ', '"threshold": 1')],
+    ids=["cut", "twice", "other"],
+)
+def test_a_changed_threshold_is_computed_and_written_again(place, monkeypatch, change):
+    scenario, text = make_scenario(SCENARIO), "windowed:n=3,arl0=50"
+    right = calibrated(make_detector(text), scenario)
+    (path,) = place.glob("*.json")
+    whole = path.read_text()
+    path.write_text(change(whole))
+    new_program(monkeypatch, may_calibrate=True)
+    again = calibrated(make_detector(text), scenario)
+    assert (again.threshold, again.arl0) == (right.threshold, right.arl0)
+    assert path.read_text() == whole
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(monkeypatch, tmp_path):
@@ -83,6 +144,16 @@ def test_a_write_that_fails_leaves_nothing(place, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", full)
     calibration_cache.store(NAME, SETTING, "")
+    assert list(place.iterdir()) == []
+
+
+def test_an_interrupted_write_leaves_nothing(place, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        calibration_cache.store(NAME, SETTING, "")
     assert list(place.iterdir()) == []
 
 
