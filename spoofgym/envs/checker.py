@@ -51,6 +51,7 @@ def check_vector_env(
     - nothing returned shares memory with what an earlier call returned, or is changed by a later call;
     - infos hold no NaN;
     - seeds are a number, a sequence with a number or None per lane, or None, where the random streams go on;
+    - ``np_random_seed`` tells the seed of each lane, and ``np_random`` its generator;
     - bad seeds and masks, and in the mode DISABLED a step of a lane that is over, raise an exception.
 
     Spaces must be those whose samples are arrays (Box, Discrete, MultiDiscrete, MultiBinary).
@@ -388,6 +389,7 @@ def _check_seeds(
             infos = singles.reset(seeds, everyone)
             _check_observation(vector, observation, singles.observations, where)
             _check_infos(info, infos, where)
+            _check_generators(vector, singles, where)
             actions = sample(vector)
             result = vector.step(actions)
             singles.step(actions)
@@ -396,6 +398,16 @@ def _check_seeds(
     finally:
         vector.close()
         singles.close()
+
+
+def _check_generators(vector: VectorEnv, singles: _Singles, where: str) -> None:
+    told, expected = vector.np_random_seed, tuple(env.np_random_seed for env in singles.envs)
+    assert isinstance(told, tuple), f"{where}: np_random_seed is {told!r}, no tuple of the lanes' seeds"
+    assert told == expected, f"{where}: np_random_seed is {told}, those of the single environments are {expected}"
+    generators = vector.np_random
+    assert isinstance(generators, tuple), f"{where}: np_random is {generators!r}, no tuple of the lanes' generators"
+    right = len(generators) == len(expected) and all(isinstance(item, np.random.Generator) for item in generators)
+    assert right, f"{where}: np_random is {generators}, not a generator for each of {len(expected)} lanes"
 
 
 def _check_refusals(make_vector: MakeVector, num_envs: int, seed: int, sample: SampleActions) -> None:
