@@ -12,6 +12,8 @@ from typing import cast
 
 import numpy as np
 
+from spoofgym import validation
+
 PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders")
 
 
@@ -34,12 +36,10 @@ class RunStreams:
         """Streams of runs seeded ``seed + i``, as Gymnasium seeds the lanes of a vector environment.
 
         Raises:
-            ValueError: the seed is negative, or there is no run.
+            ValueError: the seed is negative or no integer, or there is no run, or too many.
         """
-        if seed is not None and seed < 0:
-            raise ValueError(f"seed must be a non-negative integer or None, got {seed}")
-        if num_runs < 1:
-            raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
+        seed = validation.seed("random streams", seed)
+        num_runs = validation.runs("random streams", "num_runs", num_runs)
         seeds = [None] * num_runs if seed is None else [seed + i for i in range(num_runs)]
         return cls([np.random.Generator(np.random.PCG64(np.random.SeedSequence(s))) for s in seeds])
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline
@@ -91,14 +92,14 @@ class TightScenario(Scenario):
     offers = (INERTIAL_SOLUTION, RANGES)
 
     def __post_init__(self) -> None:
-        check_game(self.timeline, self.trajectory)
+        check_game(f"scenario {self.name!r}", self.timeline, self.trajectory)
         if self.observable not in OBSERVABLES:
             raise ValueError(f"observable must be one of {', '.join(OBSERVABLES)}, got {self.observable!r}")
 
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, 1.0 / self.rate, self.horizon)
+        return Timeline.steady(self.onset, 1.0 / self.rate, self.horizon)
 
     @property
     def dimension(self) -> int:  # type: ignore[override]
@@ -123,7 +124,7 @@ class TightScenario(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         interval = self.timeline.interval
-        return Timeline(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
+        return Timeline.steady(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
 
     def _samples(self, times: Floats) -> Runs:
         return np.asarray(np.round(times * self.trajectory.rate), dtype=np.int64)
@@ -176,7 +177,7 @@ class TightScenario(Scenario):
             )
         return first
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def tight_model(self, burn_in: int = 0) -> TightModel:
         """The game in the linear fidelity, from epoch -burn_in on, every range used."""
         first = self._first(burn_in)
@@ -211,13 +212,13 @@ class TightScenario(Scenario):
             self.tuning,
             self.tuning.position_random_walk,
             model.prior_covariance,
-            Timeline(times[0], self.timeline.interval, self.horizon + burn_in),
+            Timeline.steady(times[0], self.timeline.interval, self.horizon + burn_in),
         )
         first = self._first(burn_in)
         satellites = self.geometry.position[first : first + len(times)]
         return TightStrapdownNavigator(inertial, model, satellites, num_runs, slices, demands)
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def _initial_factors(self, burn_in: int) -> tuple[Floats, Floats]:
         """Square roots of the covariance of the error, (n, n), and of the estimated biases, (6, 6)."""
         prior = self.tight_model(burn_in).prior_covariance

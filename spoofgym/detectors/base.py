@@ -210,7 +210,7 @@ class ThresholdDetector(Detector):
             self.threshold = validation.above(self.kind, "threshold", threshold)
         else:
             given = self.default_arl0 if arl0 is None else arl0
-            self.target_arl0 = validation.above(self.kind, "arl0", given, 1.0)
+            self.target_arl0 = validation.average_run_length(self.kind, "arl0", given)
         parameters = inspect.signature(type(self).__init__).parameters
         other = {key: value for key, value in options.items() if value != parameters[key].default}
         asked = None if self.target_arl0 == self.default_arl0 else self.target_arl0

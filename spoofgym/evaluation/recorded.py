@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
@@ -15,13 +14,12 @@ from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.geodesy import position_difference
+from spoofgym.kernels import njit
 from spoofgym.navigation.mechanization import mechanize
 from spoofgym.scenarios.log import interpolate
-from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.simulation import Simulation
 
-SETTLING = 30.0
-"""Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
 SAME_TIME = 1e-3
 """A reference epoch this close to a fix, s, is that fix and no independent check."""
 
@@ -56,9 +54,10 @@ def evaluate_recorded(
     Returns:
         A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
         detected, time_to_detect_s (from the attack's onset to the first alarm owed to it), error_at_detection_m,
-        max_error_m (largest horizontal error after the onset). None where a thing does not exist: clean errors without
-        a reference, time and error of a detection that did not happen. An alarm without an attack is no detection, nor
-        is one that comes at the same epoch of the clean log.
+        max_error_m (largest horizontal error after the onset), error_epochs (after the onset, whose error is known:
+        those in a hole of the reference have none). None where a thing does not exist: clean errors without a
+        reference, the largest of no errors, time and error of a detection that did not happen. An alarm without an
+        attack is no detection, nor is one that comes at the same epoch of the clean log.
 
     Raises:
         ValueError: what `Simulation` refuses, or a log too short for clean figures.
@@ -112,7 +111,7 @@ def held_out_errors(scenario: RecordedScenario, begin: float) -> Floats | None:
     """Horizontal error of the clean run at the reference's own times that are no fixes, from ``begin`` on, (n,), m.
 
     Between the fixes the filter's state is carried on by its inertial samples alone. Where the reference has no epochs
-    of its own, all of them count, after the fix was used; None = there is no reference.
+    of its own, all of them count, after the fix was used, but those in its holes. None = there is nothing to compare.
     """
     reference = scenario.log.reference
     if reference is None:
@@ -127,7 +126,9 @@ def held_out_errors(scenario: RecordedScenario, begin: float) -> Floats | None:
     )
     own = inside & (distance > SAME_TIME)
     if not own.any():
-        late = scenario.epoch_time >= begin
+        late = (scenario.epoch_time >= begin) & scenario.compared
+        if not late.any():
+            return None
         truth, _ = interpolate(reference, scenario.epoch_time[late])
         return horizontal(position_difference(clean.position[1:][late], truth))
     position = np.empty((len(model.step), 3))
@@ -203,21 +204,22 @@ def _play(
     simulation = Simulation(scenario, attack, detectors, seed=0, fidelity="strapdown")
     onset = scenario.timeline.start if attack.onset is None else attack.onset
     spoofing = not isinstance(attack, NoAttack)
-    detection: tuple[float, float] | None = None
-    largest = 0.0
+    detection: tuple[float, float | None] | None = None
+    errors = []
     simulation.reset()
     simulation.resolve()
-    for alarmed in false:
+    for alarmed, compared in zip(false, scenario.compared[scenario.first + 1 :], strict=False):
         time = float(simulation.observe().time[0])
         after = time > onset
         if after and spoofing and detection is None and simulation.alarm[0] and not alarmed:
-            detection = time - onset, float(horizontal(simulation.error)[0])
+            detection = time - onset, float(horizontal(simulation.error)[0]) if compared else None
         simulation.resolve()
-        if after:
-            largest = max(largest, float(horizontal(simulation.error)[0]))
+        if after and compared:
+            errors.append(float(horizontal(simulation.error)[0]))
     return {
         "detected": detection is not None,
         "time_to_detect_s": None if detection is None else detection[0],
         "error_at_detection_m": None if detection is None else detection[1],
-        "max_error_m": largest,
+        "max_error_m": float(np.max(errors)) if errors else None,
+        "error_epochs": len(errors),
     }

@@ -23,10 +23,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
+from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.tight_model import TightModel
 from spoofgym.navigation.tight_states import INERTIAL, POSITION

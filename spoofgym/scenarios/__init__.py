@@ -5,13 +5,16 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import partial
+from typing import Any
 
 from spoofgym import validation
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.cache import ScenarioCache
 from spoofgym.scenarios.foi_drive import foi_drive
 from spoofgym.scenarios.kujur_flight import kujur_flight
 from spoofgym.scenarios.liu_flight import liu_flight
+from spoofgym.scenarios.log_files import State, log_state
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.shadmehri_flight import shadmehri_flight
 from spoofgym.scenarios.song_robot import song_robot
@@ -28,14 +31,33 @@ SCENARIOS: dict[str, Callable[..., Scenario]] = {
 
 COUPLINGS = ("loose", "tight")
 
+_CACHE = ScenarioCache()
 
-@lru_cache(maxsize=32)
+
 def _build(text: str) -> Scenario:
-    return build(text, SCENARIOS, "scenario")
+    return _CACHE.get((text, _log_state(text)), partial(build, text, SCENARIOS, "scenario"))
+
+
+def _log_state(text: str) -> State | None:
+    """That of the log that a specification names; None where it names none."""
+    if not isinstance(text, str):
+        return None
+    given = Specification.parse(text)
+    folder = given.options.get("path", given.value)
+    return log_state(folder) if given.name == "recorded" and folder is not None else None
+
+
+def _made(scenario: Any) -> Scenario:
+    """From the cache what a text names; what is neither text nor scenario is refused."""
+    if isinstance(scenario, Scenario):
+        return scenario
+    return _build(scenario) if isinstance(scenario, str) else build(scenario, SCENARIOS, "scenario")
 
 
 def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scenario:
     """The scenario that a specification names; an object is returned as it is.
+
+    The scenarios that were built last are kept. A recorded one is built anew once a file of its log has changed.
 
     Args:
         scenario: the specification, or an object.
@@ -47,7 +69,7 @@ def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scen
             of the other coupling.
     """
     if coupling is None:
-        return scenario if isinstance(scenario, Scenario) else _build(scenario)
+        return _made(scenario)
     validation.one_of("scenario", "coupling", coupling, COUPLINGS)
     made = _build(_with_coupling(scenario, coupling)) if isinstance(scenario, str) else make_scenario(scenario)
     if made.coupling != coupling:

@@ -7,40 +7,39 @@ converted here, at the door; everything behind works in east-north-up, right-for
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from spoofgym.arrays import Floats
+from spoofgym.arrays import Flags, Floats
 from spoofgym.geodesy import displace, position_difference
+from spoofgym.scenarios.fix_rows import known_sigmas, usable_rows
 from spoofgym.scenarios.mounting import find_delay, find_mounting
-from spoofgym.scenarios.table import check_increasing, has_table, read_table, table_path
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from spoofgym.scenarios.notes import ENU_OF_NED, Notes
+from spoofgym.scenarios.table import check_increasing, has_table, read_table, seconds, table_path
 
 IMU_COLUMNS = ("t_s", "gx_radps", "gy_radps", "gz_radps", "ax_mps2", "ay_mps2", "az_mps2")
 POSITION_COLUMNS = ("t_s", "lat_deg", "lon_deg", "h_m")
 VELOCITY_COLUMNS = ("vn_mps", "ve_mps", "vd_mps")
 POSITION_SIGMA_COLUMNS = ("sd_n_m", "sd_e_m", "sd_d_m")
 VELOCITY_SIGMA_COLUMNS = ("sd_vn_mps", "sd_ve_mps", "sd_vd_mps")
+SIGMA_COLUMNS = (POSITION_SIGMA_COLUMNS, VELOCITY_SIGMA_COLUMNS)
 
-LIMITS = {"lat_deg": (-89.0, 89.0), "lon_deg": (-360.0, 360.0), "h_m": (-12_000.0, 100_000.0)} | {
-    name: (0.0, math.inf) for name in POSITION_SIGMA_COLUMNS + VELOCITY_SIGMA_COLUMNS
+LIMITS = {
+    **{"lat_deg": (-89.0, 89.0), "lon_deg": (-360.0, 360.0), "h_m": (-12_000.0, 100_000.0)},
+    **{name: (0.0, math.inf) for name in POSITION_SIGMA_COLUMNS + VELOCITY_SIGMA_COLUMNS},
+    **{name: (-10_000.0, 10_000.0) for name in VELOCITY_COLUMNS + IMU_COLUMNS[4:]},
+    **{name: (-1_000.0, 1_000.0) for name in IMU_COLUMNS[1:4]},
 }
 """Valid values, inclusive, of columns that have bounds."""
+LONGEST_BRIDGE = 1.0
+"""Time between two epochs of a reference over which it is always interpolated, s."""
+MOST_INTERVALS = 3.0
+"""The same in intervals of the reference."""
 PLAUSIBLE_FORCE = (5.0, 20.0)
 """Median magnitude of a specific force that contains gravity and is in m/s²."""
-ROTATION_TOLERANCE = 1e-3
-
-_ENU_OF_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-"""East, north, up from north, east, down; and right, forward, up from forward, right, down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +72,7 @@ class Log:
         imu_time: of the inertial samples, (n,), s, increasing, the IMU's delay subtracted.
         angular_rate: body R, F, U, (n, 3), rad/s.
         specific_force: the same, m/s².
+        lever_arm: from the IMU to the antenna, body R, F, U, (3,), m.
         fixes: of the receiver, their delay, stated or found, subtracted.
         reference: solution to compare with; None = the log has none.
     """
@@ -83,6 +83,7 @@ class Log:
     imu_time: Floats
     angular_rate: Floats
     specific_force: Floats
+    lever_arm: Floats
     fixes: Fixes
     reference: Fixes | None
 
@@ -93,6 +94,20 @@ def velocity_of(fixes: Fixes) -> Floats:
         return fixes.velocity
     track = position_difference(fixes.position, fixes.position[0])
     return np.asarray(np.gradient(track, fixes.time, axis=0))
+
+
+def covered(solution: Fixes, time: Floats) -> Flags:
+    """Whether a solution tells the position at times, (n,): they are its own, or lie between two that are near.
+
+    Over T seconds with an acceleration of up to a, the cubic of `interpolate` errs by a T²/16 at most: 0.2 m in one
+    second of a car that brakes and turns with 3 m/s², 19 m in ten. So a hole is not bridged. Three intervals are
+    allowed in any case, or a solution that lacks single epochs would hardly tell anything.
+    """
+    widest = max(LONGEST_BRIDGE, MOST_INTERVALS * float(np.median(np.diff(solution.time))))
+    after = np.clip(np.searchsorted(solution.time, time), 1, len(solution.time) - 1)
+    before, following = solution.time[after - 1], solution.time[after]
+    inside = (time >= before) & (time <= following) & (following - before <= widest)
+    return np.asarray(inside | (time == before) | (time == following))
 
 
 def interpolate(solution: Fixes, time: Floats) -> tuple[Floats, Floats]:
@@ -121,18 +136,19 @@ def read_log(folder: str | Path) -> Log:
             (``.csv.gz``).
 
     Raises:
-        ValueError: a file or column is missing, a value is not a finite number or out of range, time does not increase
-            (each with file name, and line where there is one), IMU, fixes and ``start_s`` do not overlap, or an unknown
-            mounting cannot be found.
+        ValueError: a file or column is missing or too large, ``log.toml`` has a key that is unknown, a value is not a
+            finite number or out of range, time does not increase (each with file name, and line where there is one),
+            IMU, fixes and ``start_s`` do not overlap, or an unknown mounting cannot be found.
+
+    Warns:
+        LogWarning: rows are left out because they are no fix, or a sigma is unknown.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"log {str(folder)!r} is no folder; a log is a folder with log.toml, imu.csv and gnss.csv")
-    notes = _read_notes(folder / "log.toml")
-    name = notes.get("name", folder.name)
-    mounting = _mounting(folder / "log.toml", notes)
-    start = _number(folder / "log.toml", notes, "start_s", None)
-
+    notes = Notes(folder / "log.toml")
+    mounting, start = notes.mounting(), notes.seconds("start_s", None)
+    delay = notes.seconds("gnss_delay_s", 0.0)
     path = table_path(folder, "imu")
     imu = read_table(path, [IMU_COLUMNS], [], LIMITS)
     check_increasing(path, imu["t_s"])
@@ -144,21 +160,22 @@ def read_log(folder: str | Path) -> Log:
             f"{path}: the median specific force is {magnitude:.3g}; it must be in m/s² and contain gravity (about 9.8)"
         )
     log = Log(
-        name=str(name),
+        name=notes.name(folder.name),
         folder=folder,
         start=start,
-        imu_time=imu["t_s"] - _number(folder / "log.toml", notes, "imu_delay_s", 0.0),
+        imu_time=imu["t_s"] - notes.seconds("imu_delay_s", 0.0),
         angular_rate=rate,
         specific_force=force,
-        fixes=_read_fixes(table_path(folder, "gnss"), _number(folder / "log.toml", notes, "gnss_delay_s", 0.0)),
-        reference=_read_fixes(table_path(folder, "reference"), 0.0) if has_table(folder, "reference") else None,
+        lever_arm=notes.lever_arm(),
+        fixes=_read_fixes(table_path(folder, "gnss"), start, delay),
+        reference=_read_reference(table_path(folder, "reference"), start) if has_table(folder, "reference") else None,
     )
     _check_overlap(log)
     if mounting is not None:
         return _turned(log, mounting, np.zeros(3))
     if "gnss_delay_s" not in notes:
-        delay = find_delay(*_motion(log))
-        log = replace(log, fixes=replace(log.fixes, time=log.fixes.time - delay))
+        found_delay = find_delay(*_motion(log))
+        log = replace(log, fixes=replace(log.fixes, time=log.fixes.time - found_delay))
     found = find_mounting(*_motion(log))
     return _turned(log, found.rotation, found.gyro_bias)
 
@@ -182,75 +199,41 @@ def _check_overlap(log: Log) -> None:
     last = min(log.imu_time[-1], log.fixes.time[-1])
     if first >= last:
         raise ValueError(
-            f"log {str(log.folder)!r}: no overlap: IMU from {log.imu_time[0]:g} to {log.imu_time[-1]:g} s, fixes from "
-            f"{log.fixes.time[0]:g} to {log.fixes.time[-1]:g} s, start_s {log.start:g} s"
+            f"log {str(log.folder)!r}: no overlap: IMU from {seconds(log.imu_time[0])} to "
+            f"{seconds(log.imu_time[-1])} s, fixes from {seconds(log.fixes.time[0])} to "
+            f"{seconds(log.fixes.time[-1])} s, start_s {seconds(log.start)} s"
         )
     if log.reference is not None and log.reference.time[0] > last:
         raise ValueError(
-            f"log {str(log.folder)!r}: the reference begins at {log.reference.time[0]:g} s, after the log's end"
+            f"log {str(log.folder)!r}: the reference begins at {seconds(log.reference.time[0])} s, after the log's end"
         )
 
 
-def _read_notes(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        raise ValueError(f"{path} is missing")
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not valid TOML: {error}") from None
+def _read_fixes(path: Path, start: float, delay: float) -> Fixes:
+    table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, *SIGMA_COLUMNS], LIMITS)
+    rows, lines = usable_rows(path, table, start + delay)
+    check_increasing(path, rows["t_s"], lines)
+    return _fixes(known_sigmas(path, rows, lines, start + delay), delay)
 
 
-def _number(path: Path, notes: dict[str, Any], key: str, default: float | None) -> float:
-    value = notes.get(key, default)
-    if value is None:
-        raise ValueError(f"{path}: {key} is missing; it must be a finite number of seconds")
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"{path}: {key} must be a finite number of seconds, got {value!r}")
-    return float(value)
+def _read_reference(path: Path, start: float) -> Fixes:
+    """Its sigmas only tell which rows are no position."""
+    table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS], LIMITS)
+    rows, lines = usable_rows(path, table, start)
+    check_increasing(path, rows["t_s"], lines)
+    return replace(_fixes(rows, 0.0), position_sigma=None)
 
 
-def _mounting(path: Path, notes: dict[str, Any]) -> Floats | None:
-    """Rotation from sensor axes to body right, forward, up, (3, 3); None = unknown.
-
-    Raises:
-        ValueError: the key is missing, or its value is no rotation.
-    """
-    if "imu_to_body_frd" not in notes:
-        raise ValueError(f"{path}: imu_to_body_frd is missing; where the mounting is unknown it must be [], empty")
-    value = notes["imu_to_body_frd"]
-    if value == []:
-        return None
-    message = (
-        f"{path}: imu_to_body_frd must be a rotation, 3 rows of 3 numbers (body forward, right, down), got {value!r}"
-    )
-    try:
-        matrix = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(message) from None
-    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
-        raise ValueError(message)
-    left, scale, right = np.linalg.svd(matrix)
-    rotation: Floats = left @ right
-    if np.any(np.abs(scale - 1.0) > ROTATION_TOLERANCE) or np.linalg.det(rotation) < 0.0:
-        raise ValueError(message)
-    return np.asarray(_ENU_OF_NED @ rotation)
-
-
-def _read_fixes(path: Path, delay: float) -> Fixes:
-    optional: list[tuple[str, ...]] = [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS, VELOCITY_SIGMA_COLUMNS]
-    table = read_table(path, [POSITION_COLUMNS], optional, LIMITS)
-    check_increasing(path, table["t_s"])
-    position = np.column_stack([np.radians(table["lat_deg"]), np.radians(table["lon_deg"]), table["h_m"]])
-
+def _fixes(rows: dict[str, Floats], delay: float) -> Fixes:
     def enu(columns: tuple[str, ...], matrix: Floats) -> Floats | None:
-        if columns[0] not in table:
+        if columns[0] not in rows:
             return None
-        return np.column_stack([table[column] for column in columns]) @ matrix.T
+        return np.column_stack([rows[column] for column in columns]) @ matrix.T
 
     return Fixes(
-        time=table["t_s"] - delay,
-        position=position,
-        velocity=enu(VELOCITY_COLUMNS, _ENU_OF_NED),
-        position_sigma=enu(POSITION_SIGMA_COLUMNS, np.abs(_ENU_OF_NED)),
-        velocity_sigma=enu(VELOCITY_SIGMA_COLUMNS, np.abs(_ENU_OF_NED)),
+        time=rows["t_s"] - delay,
+        position=np.column_stack([np.radians(rows["lat_deg"]), np.radians(rows["lon_deg"]), rows["h_m"]]),
+        velocity=enu(VELOCITY_COLUMNS, ENU_OF_NED),
+        position_sigma=enu(POSITION_SIGMA_COLUMNS, np.abs(ENU_OF_NED)),
+        velocity_sigma=enu(VELOCITY_SIGMA_COLUMNS, np.abs(ENU_OF_NED)),
     )

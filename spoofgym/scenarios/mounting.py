@@ -31,6 +31,12 @@ MIN_YAW_CORRELATION = 0.5
 DELAYS = np.linspace(-1.0, 1.0, 41)
 """Delays of the fixes that are tried, s."""
 ITERATIONS = 10
+NO_MOUNTING = "the mounting of the IMU cannot be found"
+NO_RANGE_DELAY = (
+    "the delay of the ranges against the IMU cannot be found by the velocities from range_rate_mps, which may have a "
+    "wrong sign or unit, or be on another clock than the IMU"
+)
+"""What the drive does not tell, for messages."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +82,13 @@ class _Intervals:
 
 
 def find_delay(
-    owner: str, imu_time: Floats, angular_rate: Floats, specific_force: Floats, fix_time: Floats, velocity: Floats
+    owner: str,
+    imu_time: Floats,
+    angular_rate: Floats,
+    specific_force: Floats,
+    fix_time: Floats,
+    velocity: Floats,
+    failure: str = NO_MOUNTING,
 ) -> float:
     """How much later than the IMU the fixes are stamped, s: where yaw rate and course rate correlate best.
 
@@ -87,18 +99,22 @@ def find_delay(
         specific_force: sensor axes, (n, 3), m/s².
         fix_time: (f,), s, increasing.
         velocity: of the fixes, (f, 3), ENU, m/s.
+        failure: what an error says that the drive does not tell.
 
     Raises:
         ValueError: too little motion, no turns, or a delay of a second or more.
     """
+    blame = f"{owner}: {failure}"
     correlation = []
     for delay in DELAYS:
-        intervals = _intervals(owner, imu_time, angular_rate, specific_force, fix_time - delay, velocity)
+        intervals = _intervals(blame, imu_time, angular_rate, specific_force, fix_time - delay, velocity)
         correlation.append(_yaw_correlation(intervals, _direction(intervals.specific_force[intervals.moving])))
     best = int(np.argmax(correlation))
-    _check_yaw(owner, correlation[best])
+    _check_yaw(blame, correlation[best])
     if best in (0, len(DELAYS) - 1):
-        raise ValueError(f"{owner}: fixes and IMU are {abs(DELAYS[best]):g} s apart or more; set gnss_delay_s")
+        raise ValueError(
+            f"{owner}: fixes and IMU are {abs(DELAYS[best]):g} s apart or more; set gnss_delay_s (of ranges: imu_delay_s)"
+        )
     before, at, after = correlation[best - 1 : best + 2]
     vertex = 0.5 * (before - after) / (before - 2.0 * at + after)
     return float(DELAYS[best] + vertex * (DELAYS[1] - DELAYS[0]))
@@ -113,33 +129,33 @@ def find_mounting(
         ValueError: the drive does not determine it: too little motion, too little acceleration, no turns, or an angular
             rate that does not fit the course.
     """
-    intervals = _intervals(owner, imu_time, angular_rate, specific_force, fix_time, velocity)
+    blame = f"{owner}: {NO_MOUNTING}"
+    intervals = _intervals(blame, imu_time, angular_rate, specific_force, fix_time, velocity)
     moving = intervals.moving
     rotation, heading_sigma = _rotation(intervals)
     if not heading_sigma <= MAX_HEADING_SIGMA:
         raise ValueError(
-            f"{owner}: the mounting of the IMU cannot be found: its heading about the vertical is known to "
+            f"{blame}: its heading about the vertical is known to "
             f"{np.degrees(heading_sigma):.2g}° (1 sigma), needed are {np.degrees(MAX_HEADING_SIGMA):g}° or less; the "
             f"vehicle must accelerate, brake and turn, or set imu_to_body_frd"
         )
     correlation = _yaw_correlation(intervals, rotation[2])
-    _check_yaw(owner, correlation)
+    _check_yaw(blame, correlation)
     standing = intervals.angular_rate[intervals.standing & ~moving]
     bias = np.median(standing, axis=0) if len(standing) >= MIN_STANDSTILL else np.zeros(3)
     return Mounting(rotation, heading_sigma, bias, correlation)
 
 
-def _check_yaw(owner: str, correlation: float) -> None:
+def _check_yaw(blame: str, correlation: float) -> None:
     if not correlation >= MIN_YAW_CORRELATION:
         raise ValueError(
-            f"{owner}: the mounting of the IMU cannot be found: yaw rate and course rate have a correlation of "
-            f"{correlation:.2f}, needed is {MIN_YAW_CORRELATION:g} or more; the vehicle must turn, and gyro and "
+            f"{blame}: yaw rate and course rate have a correlation of {correlation:.2f}, needed is {MIN_YAW_CORRELATION:g} or more; the vehicle must turn, and gyro and "
             f"accelerometer must have the same right-handed axes"
         )
 
 
 def _intervals(
-    owner: str, imu_time: Floats, angular_rate: Floats, specific_force: Floats, fix_time: Floats, velocity: Floats
+    blame: str, imu_time: Floats, angular_rate: Floats, specific_force: Floats, fix_time: Floats, velocity: Floats
 ) -> _Intervals:
     begin, end = fix_time[:-1], fix_time[1:]
     step = end - begin
@@ -151,8 +167,8 @@ def _intervals(
     moving = used & (slower >= MIN_SPEED)
     if np.count_nonzero(moving) < MIN_INTERVALS:
         raise ValueError(
-            f"{owner}: the mounting of the IMU cannot be found: {np.count_nonzero(moving)} intervals between fixes at "
-            f"{MIN_SPEED:g} m/s or more, needed are {MIN_INTERVALS}; set imu_to_body_frd"
+            f"{blame}: {np.count_nonzero(moving)} intervals between fixes at {MIN_SPEED:g} m/s or more, needed are "
+            f"{MIN_INTERVALS}"
         )
     return _Intervals(
         moving=moving[used],
@@ -160,12 +176,12 @@ def _intervals(
         forward=(np.diff(speed) / step)[used],
         right=(0.5 * (speed[:-1] + speed[1:]) * course_rate)[used],
         course_rate=course_rate[used],
-        angular_rate=_means(imu_time, angular_rate, begin[used], end[used]),
-        specific_force=_means(imu_time, specific_force, begin[used], end[used]),
+        angular_rate=interval_means(imu_time, angular_rate, begin[used], end[used]),
+        specific_force=interval_means(imu_time, specific_force, begin[used], end[used]),
     )
 
 
-def _means(time: Floats, samples: Floats, begin: Floats, end: Floats) -> Floats:
+def interval_means(time: Floats, samples: Floats, begin: Floats, end: Floats) -> Floats:
     """Of the straight lines between the samples, over each interval, (n, 3)."""
     areas = 0.5 * (samples[1:] + samples[:-1]) * np.diff(time)[:, None]
     integral = np.vstack([np.zeros(3), np.cumsum(areas, axis=0)])

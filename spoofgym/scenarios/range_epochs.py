@@ -10,9 +10,9 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios.log import Fixes, Log
-from spoofgym.scenarios.range_fixes import RangeSolution, fixes_of, range_delay, solve_ranges
+from spoofgym.scenarios.range_fixes import RangeSolution, check_solved, fixes_of, range_delay, solve_ranges
 from spoofgym.scenarios.ranges_log import Ranges, correct, read_ranges
-from spoofgym.scenarios.table import has_table
+from spoofgym.scenarios.table import has_table, seconds
 from spoofgym.sensors.geometry import SatelliteGeometry
 
 UNSTEADY = 0.1
@@ -82,9 +82,7 @@ def range_epochs(log: Log) -> RangeEpochs:
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) for a filter to take")
     ranges = steady(read_ranges(log.folder), str(log.folder))
     solution = solve_ranges(ranges, log.fixes.position[0])
-    number = int(solution.solved.sum())
-    if number < 2:
-        raise ValueError(f"log {str(log.folder)!r}: ranges must give a fix in 2 epochs or more, they do in {number}")
+    check_solved(log, ranges, solution)
     delay = range_delay(log, solution)
     position, velocity, clock, drift = _between_fixes(solution)
     corrected = correct(ranges, position, clock)
@@ -141,7 +139,7 @@ def steady(ranges: Ranges, owner: str) -> Ranges:
     off = np.flatnonzero(np.abs(steps - number) > UNSTEADY)
     if len(off):
         raise ValueError(
-            f"{owner}: ranges must come at a steady rate: after {ranges.time[off[0]]:.9g} s the next come "
+            f"{owner}: ranges must come at a steady rate: after {seconds(ranges.time[off[0]])} s the next come "
             f"{steps[off[0]] * interval:.4g} s later, with a median of {interval:.4g} s"
         )
     place = np.concatenate([[0], np.cumsum(number).astype(np.int64)])

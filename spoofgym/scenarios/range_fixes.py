@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.scenarios.log import Fixes, Log
-from spoofgym.scenarios.mounting import find_delay
+from spoofgym.scenarios.mounting import NO_RANGE_DELAY, find_delay
 from spoofgym.scenarios.ranges_log import CorrectedRanges, Ranges, correct, read_ranges
 from spoofgym.scenarios.table import has_table
 from spoofgym.sensors.least_squares import Fix, VelocityFix, fix, velocity_fix
@@ -26,6 +26,8 @@ MAX_SIGMA = 20.0
 """A fix with a larger horizontal 1 sigma is none, m."""
 MAX_VELOCITY_SIGMA = 2.0
 """The same of its velocity, m/s."""
+LEAST_SHARE = 0.1
+"""Share of the positions that have a velocity, too, at least; where rates are wrong, hardly any has."""
 PASSES = 2
 """Of corrections and fixes, before faults are looked for: a first clock and place, then good ones."""
 
@@ -41,7 +43,8 @@ class RangeSolution:
         clock_drift: (E,), m/s.
         position_sigma: ENU, (E, 3), m.
         velocity_sigma: ENU, (E, 3), m/s.
-        solved: position and velocity passed the tests of their residuals and have small sigmas, (E,).
+        placed: position passed the test of its residuals and has a small sigma, (E,).
+        solved: so did position and velocity, (E,).
         corrected: the ranges, at these positions.
         used: ranges that were not left out, (E, S).
         used_rate: range rates that were not left out, (E, S).
@@ -53,6 +56,7 @@ class RangeSolution:
     clock_drift: Floats
     position_sigma: Floats
     velocity_sigma: Floats
+    placed: Flags
     solved: Flags
     corrected: CorrectedRanges
     used: Flags
@@ -72,8 +76,33 @@ def range_fixes(log: Log) -> Fixes:
     """
     if not has_table(log.folder, "ranges"):
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) to make fixes from")
-    solution = solve_ranges(read_ranges(log.folder), log.fixes.position[0])
+    ranges = read_ranges(log.folder)
+    solution = solve_ranges(ranges, log.fixes.position[0])
+    check_solved(log, ranges, solution)
     return fixes_of(solution, range_delay(log, solution))
+
+
+def check_solved(log: Log, ranges: Ranges, solution: RangeSolution) -> None:
+    """Refuse ranges that hardly give a fix, and say whether the codes or the rates are to blame.
+
+    Raises:
+        ValueError: there are fewer than 2 positions, or velocities for less than `LEAST_SHARE` of them.
+    """
+    owner, epochs = f"log {str(log.folder)!r}: ranges", len(ranges.time)
+    placed, solved = int(solution.placed.sum()), int(solution.solved.sum())
+    if placed < 2:
+        raise ValueError(
+            f"{owner} must give a fix in 2 epochs or more, pseudorange_m gives a position in {placed} of {epochs}; it "
+            "must be in metres, t_s the time of the GPS week, and the fixes within 100 km"
+        )
+    if solved < max(2.0, LEAST_SHARE * placed):
+        turned = solve_ranges(replace(ranges, range_rate=-ranges.range_rate), log.fixes.position[0])
+        sign = "; with all signs changed they fit" if turned.solved.sum() > LEAST_SHARE * placed else ""
+        raise ValueError(
+            f"{owner} must give a fix in 2 epochs or more: range_rate_mps gives a velocity in {solved} of {placed} "
+            f"epochs that have a position; the rates must be in m/s and positive where the satellite recedes, - Doppler "
+            f"x c / f{sign}"
+        )
 
 
 def fixes_of(solution: RangeSolution, delay: float) -> Fixes:
@@ -103,8 +132,10 @@ def range_delay(log: Log, solution: RangeSolution) -> float:
     """
     time, velocity = solution.corrected.geometry.time[solution.solved], solution.velocity[solution.solved]
     after = time >= log.start
-    owner = f"log {str(log.folder)!r}, fixes from ranges"
-    return find_delay(owner, log.imu_time, log.angular_rate, log.specific_force, time[after], velocity[after])
+    moved = time[after], velocity[after]
+    return find_delay(
+        f"log {str(log.folder)!r}", log.imu_time, log.angular_rate, log.specific_force, *moved, failure=NO_RANGE_DELAY
+    )
 
 
 def solve_ranges(ranges: Ranges, start: Floats) -> RangeSolution:
@@ -124,8 +155,8 @@ def solve_ranges(ranges: Ranges, start: Floats) -> RangeSolution:
     place, used = without_faults(_position(corrected, start), corrected.geometry.present, corrected.sigma)
     rate, used_rate = without_faults(_velocity(corrected, position), corrected.has_rate, corrected.rate_sigma)
     sigma, rate_sigma = (np.sqrt(np.diagonal(part.covariance, axis1=1, axis2=2)[:, :3]) for part in (place, rate))
-    solved = place.solved & rate.solved & (np.hypot(sigma[:, 0], sigma[:, 1]) <= MAX_SIGMA)
-    solved &= np.hypot(rate_sigma[:, 0], rate_sigma[:, 1]) <= MAX_VELOCITY_SIGMA
+    placed = place.solved & (np.hypot(sigma[:, 0], sigma[:, 1]) <= MAX_SIGMA)
+    solved = placed & rate.solved & (np.hypot(rate_sigma[:, 0], rate_sigma[:, 1]) <= MAX_VELOCITY_SIGMA)
     return RangeSolution(
         position=place.position,
         clock=place.clock,
@@ -133,6 +164,7 @@ def solve_ranges(ranges: Ranges, start: Floats) -> RangeSolution:
         clock_drift=rate.clock_drift,
         position_sigma=sigma,
         velocity_sigma=rate_sigma,
+        placed=placed,
         solved=solved,
         corrected=corrected,
         used=used,

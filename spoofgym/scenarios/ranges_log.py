@@ -15,7 +15,7 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.scenarios.table import read_table, table_path
+from spoofgym.scenarios.table import read_table, seconds, table_path
 from spoofgym.sensors.ephemeris import Ephemeris, read_csv, time_between
 from spoofgym.sensors.geometry import SatelliteGeometry, lines_of_sight, received_states
 from spoofgym.sensors.ranging import troposphere_mapping
@@ -118,7 +118,7 @@ def read_ranges(folder: str | Path) -> Ranges:
     twice = np.flatnonzero(np.bincount(epoch * shape[1] + slot, minlength=shape[0] * shape[1]) > 1)
     if len(twice):
         which = ephemeris.satellites[twice[0] % shape[1]]
-        raise ValueError(f"{path}: satellite {which} is there twice at {time[twice[0] // shape[1]]:.9g} s")
+        raise ValueError(f"{path}: satellite {which} is there twice at {seconds(time[twice[0] // shape[1]])} s")
     _check_age(path, time, ephemeris)
 
     def packed(values: Any, empty: Any) -> Any:

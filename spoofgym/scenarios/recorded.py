@@ -25,11 +25,15 @@ from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.warm_start import ERROR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import CleanRun, clean_run
-from spoofgym.scenarios.log import read_log, velocity_of
+from spoofgym.scenarios.lever_arm import with_velocity_at_imu
+from spoofgym.scenarios.log import Log, read_log, velocity_of
+from spoofgym.scenarios.log_warning import warn
 from spoofgym.scenarios.range_epochs import range_epochs
 from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
+from spoofgym.scenarios.reference import check_reference
+from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
@@ -81,7 +85,7 @@ class RecordedFixes(RecordedScenario):
         first = self.alignment.fix
         stop = int(np.searchsorted(self.log.fixes.time, self._end, side="right"))
         if stop - first < 4:
-            raise ValueError(f"scenario {self.name!r}: too few fixes after the alignment at {self.align_time:g} s")
+            raise ValueError(f"scenario {self.name!r}: too few fixes after the alignment at {seconds(self.align_time)} s")
         return slice(first + 1, stop)
 
     @cached_property
@@ -119,8 +123,9 @@ class RecordedFixes(RecordedScenario):
     @cached_property
     def clean(self) -> CleanRun:
         """The filter on the unspoofed fixes, from the alignment to the end of the log."""
-        run = clean_run(self.model)
-        self._check_clean(run)
+        with self._refusing_divergence():
+            run = clean_run(self.model)
+        self._warn_of_large_innovations(run)
         return run
 
     def navigator(
@@ -185,7 +190,7 @@ def recorded(
         raise ValueError("recorded: velocity, sigma_floor and fixes are of fixes; coupling=tight takes none")
     options = {
         "grade": (grade, "automotive"),
-        "onset": (onset, None),
+        "onset": (None if onset is None else np.format_float_positional(onset, trim="-"), None),
         "horizon": (horizon, None),
         "velocity": (velocity, None),
         "sigma_floor": (sigma_floor, SIGMA_FLOOR),
@@ -205,14 +210,28 @@ def recorded(
     log = read_log(path)
     if coupling == "tight":
         epochs = range_epochs(log)
-        log = replace(log, fixes=epochs.fixes)
+        log = replace(log, fixes=epochs.fixes, lever_arm=_no_arm(log))
+        check_reference(log)
         return RecordedRanges(
             name=name, log=log, grade=imu, tuning=tuning, epochs=epochs, onset=onset, horizon=horizon
         )
     if fixes == "ranges":
         log = replace(log, fixes=range_fixes(log))
+    check_reference(log)
+    log = with_velocity_at_imu(log)
     if velocity is False or (velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
     return RecordedFixes(
         name=name, log=log, grade=imu, tuning=tuning, sigma_floor=sigma_floor, onset=onset, horizon=horizon
     )
+
+
+def _no_arm(log: Log) -> Floats:
+    """The lever arm of a filter that knows none, (3,), m, with a warning where the log has one."""
+    if log.lever_arm.any():
+        warn(
+            log.folder,
+            f"log.toml: coupling=tight does not know antenna_lever_arm_m and takes the antenna for the IMU: positions err "
+            f"by up to {np.linalg.norm(log.lever_arm):.1f} m",
+        )
+    return np.zeros(3)

@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from spoofgym.arrays import Floats
-from spoofgym.geodesy import position_difference
+from spoofgym.arrays import Flags, Floats
+from spoofgym.geodesy import displace, position_difference
+from spoofgym.navigation.divergence import FilterDivergedError
 from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.alignment import Alignment, align
-from spoofgym.scenarios.clean_run import CleanRun
-from spoofgym.scenarios.log import Log, interpolate
+from spoofgym.scenarios.clean_run import CleanRun, coast
+from spoofgym.scenarios.log import Log, covered, interpolate
+from spoofgym.scenarios.log_warning import warn
+from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import ImuGrade
 
 MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""
+SETTLING = 30.0
+"""Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
+LARGEST_NIS = 2.0
+"""Mean NIS of a clean run per degree of freedom above which the log is doubted: a filter that believes its sigmas has
+1, and the process noise of recorded scenarios is so generous that good logs stay well below it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedScenario(Scenario):
     """A game on a log, in the strapdown fidelity. The filter is aligned on its fixes and runs from there.
 
-    ``timeline.interval`` is the median of those between the epochs.
+    Epochs are where the receiver gave something; ``timeline.interval`` is the median of the times between them.
 
     Attributes:
         name: the specification that builds it.
@@ -40,8 +50,14 @@ class RecordedScenario(Scenario):
         horizon: epochs of the game; None = to the end of the log.
         drag_off_rate: largest rate of the spoofed position per axis, m/s.
         error_scale: metres of error that make a reward of 1.
+        doubts: what is likely wrong with a log on which the filter is bad.
     """
 
+    doubts = (
+        "fixes and IMU on different clocks (imu_delay_s, gnss_delay_s), an antenna far from the IMU "
+        "(antenna_lever_arm_m), a wrong mounting (imu_to_body_frd), sigmas of fixes that are too small (sigma_floor), "
+        "single wrong fixes, an IMU that is worse than its grade"
+    )
     fidelities = ("strapdown",)
     matched = False
     random = False
@@ -88,15 +104,15 @@ class RecordedScenario(Scenario):
         """As far as IMU and reference reach, s.
 
         Raises:
-            ValueError: the reference begins after the alignment.
+            ValueError: the reference ends before the alignment.
         """
         log, end = self.log, float(self.log.imu_time[-1])
         if log.reference is None:
             return end
-        if log.reference.time[0] > self.align_time:
+        if log.reference.time[-1] <= self.align_time:
             raise ValueError(
-                f"scenario {self.name!r}: the reference begins at {log.reference.time[0]:g} s, after the alignment "
-                f"at {self.align_time:g} s; move start_s in log.toml"
+                f"scenario {self.name!r}: the reference ends at {seconds(log.reference.time[-1])} s, before the "
+                f"alignment at {seconds(self.align_time)} s"
             )
         return min(end, float(log.reference.time[-1]))
 
@@ -120,15 +136,15 @@ class RecordedScenario(Scenario):
             onset = min(max(onset, time[0]), time[-2])
         if not time[0] <= onset < time[-1]:
             raise ValueError(
-                f"scenario {self.name!r}: onset {onset:g} s lies outside the log: valid from {time[0]:g} s (the first "
-                f"fix after the alignment) to {time[-2]:g} s"
+                f"scenario {self.name!r}: onset {seconds(onset)} s lies outside the log: valid from "
+                f"{seconds(time[0])} s (the first fix after the alignment) to {seconds(time[-2])} s"
             )
         first = int(np.searchsorted(time, onset + 1e-9, side="right")) - 1
         longest = len(time) - 1 - first
         if self.horizon is not None and not 1 <= self.horizon <= longest:
             raise ValueError(
                 f"scenario {self.name!r}: horizon {self.horizon} does not fit: valid from 1 to {longest} epochs after "
-                f"{onset:g} s"
+                f"{seconds(onset)} s"
             )
         return first
 
@@ -141,7 +157,7 @@ class RecordedScenario(Scenario):
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
         time = self.epoch_time[self.first : self.last + 1]
-        return Timeline(float(time[0]), float(np.median(np.diff(time))), len(time) - 1)
+        return Timeline(time, float(np.median(np.diff(time))))
 
     def _check_imu(self, onset: float, end: float) -> None:
         time, begin = self.log.imu_time, self.align_time
@@ -150,21 +166,40 @@ class RecordedScenario(Scenario):
             at, length = time[gaps[0]], time[gaps[0] + 1] - time[gaps[0]]
             remedy = "a smaller horizon ends the game before it" if at > onset else "a later start_s begins after it"
             raise ValueError(
-                f"scenario {self.name!r}: the IMU has a gap of {length:.3g} s at {at:g} s; valid is at most "
-                f"{MAX_IMU_GAP:g} s between the alignment at {begin:g} s and the end of the game at {end:g} s; {remedy}"
+                f"scenario {self.name!r}: the IMU has a gap of {length:.3g} s at {seconds(at)} s; valid is at most "
+                f"{MAX_IMU_GAP:g} s between the alignment at {seconds(begin)} s and the end of the game at "
+                f"{seconds(end)} s; {remedy}"
             )
 
     @cached_property
-    def _truth(self) -> tuple[Floats, Floats] | None:
-        """Position and velocity (ENU, m/s) of the reference at the epochs, (E, 3) each; None = the log has none."""
+    def compared(self) -> Flags:
+        """Epochs after the alignment whose true position is known, (E,): not in a hole of the reference.
+
+        Without a reference, which makes the clean run the truth, these are all.
+        """
         reference = self.log.reference
-        return None if reference is None else interpolate(reference, self.epoch_time)
+        return np.ones(len(self.epoch_time), dtype=bool) if reference is None else covered(reference, self.epoch_time)
+
+    @cached_property
+    def _truth(self) -> tuple[Floats, Floats] | None:
+        """Position and velocity (ENU, m/s) of the reference at the epochs, (E, 3) each; None = the log has none.
+
+        In a hole, or before the reference begins, they mean nothing.
+        """
+        reference = self.log.reference
+        if reference is None:
+            return None
+        return interpolate(reference, np.clip(self.epoch_time, reference.time[0], reference.time[-1]))
+
+    def _known(self, truth: int, otherwise: Floats) -> Floats:
+        """Position (0) or velocity (1) of the reference, and something else, (E, 3), where it does not know it."""
+        return otherwise if self._truth is None else np.where(self.compared[:, None], self._truth[truth], otherwise)
 
     def _inertial_model(self, position: Floats, velocity: Floats, covariance: Floats) -> StrapdownModel:
         """The samples of all epochs after the alignment, as straight lines cut so that a step ends at each epoch.
 
         Args:
-            position: of the fixes, and of the truth where the log has no reference, (E, 3).
+            position: of the fixes, and of the truth where no reference tells it, (E, 3).
             velocity: likewise, (E, 3), ENU, m/s.
             covariance: the filter's R of fixes, (E, m, m).
         """
@@ -186,9 +221,9 @@ class RecordedScenario(Scenario):
             boundaries=np.searchsorted(grid, ends).astype(np.int64),
             fix_position=position,
             fix_velocity=velocity,
-            true_position=position if self._truth is None else self._truth[0],
-            true_velocity=velocity if self._truth is None else self._truth[1],
-            lever_arm=np.zeros(3),
+            true_position=self._known(0, position),
+            true_velocity=self._known(1, velocity),
+            lever_arm=self.log.lever_arm,
             latency_samples=0,
             measurement_covariance=covariance,
             filter_density=self.tuning.noise_density(self.grade),
@@ -219,32 +254,71 @@ class RecordedScenario(Scenario):
             prior_covariance=clean.covariance[first],
         )
 
-    def _check_clean(self, run: CleanRun) -> None:
-        """Refuse a clean run that went astray.
+    @contextmanager
+    def _refusing_divergence(self) -> Iterator[None]:
+        """Refuse the log where the clean run made in this block diverges.
 
         Raises:
-            ValueError: its position is not finite.
+            ValueError: it does; the message says when, and likely reasons.
         """
-        if not np.all(np.isfinite(run.position)):
+        try:
+            yield
+        except FilterDivergedError as error:
             raise ValueError(
-                f"scenario {self.name!r}: the filter diverges on this log; check imu_to_body_frd and grade"
+                f"scenario {self.name!r}: the filter diverges on this log; likely reasons: {self.doubts} ({error})"
+            ) from error
+
+    def _warn_of_large_innovations(self, run: CleanRun) -> None:
+        """Warn of a clean run whose innovations are too large.
+
+        Warns:
+            LogWarning: the mean NIS, from `SETTLING` after the alignment on, and likely reasons.
+        """
+        settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
+        first = settled if settled < len(self.epoch_time) else 0
+        per_degree = run.nis_per_degree(first)
+        if per_degree > LARGEST_NIS:
+            worst = first + int(np.argmax(run.nis[first:]))
+            warn(
+                self.log.folder,
+                f"clean innovations are {np.sqrt(per_degree):.1f} times as large as the filter believes: mean NIS "
+                f"{np.mean(run.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; the "
+                f"largest is {run.nis[worst]:.3g} at {seconds(self.epoch_time[worst])} s; likely reasons: {self.doubts}",
             )
 
     @cached_property
     def true_position(self) -> Floats:
-        """Of all epochs after the alignment, (E, 3): the reference's, else the clean run's."""
-        return self.clean.position[1:] if self._truth is None else self._truth[0]
+        """Of all epochs after the alignment, (E, 3): the reference's, else the clean run's.
 
-    @property
+        In a hole of the reference it is the clean run's, less its error at the ends of the hole, in between a straight
+        line in time: what a game needs to go on, but no truth.
+        """
+        clean = self.clean.position[1:]
+        place = self._known(0, clean)
+        if self.compared.all():
+            return place
+        error = self._across_holes(position_difference(place, clean))
+        return np.where(self.compared[:, None], place, displace(clean, error))
+
+    @cached_property
     def true_velocity(self) -> Floats:
-        """Of all epochs after the alignment, (E, 3), ENU, m/s: the reference's, else the clean run's."""
-        return self.clean.velocity[1:] if self._truth is None else self._truth[1]
+        """Of all epochs after the alignment, (E, 3), ENU, m/s, formed as the position is."""
+        clean = self.clean.velocity[1:]
+        velocity = self._known(1, clean)
+        return np.where(self.compared[:, None], velocity, clean + self._across_holes(velocity - clean))
+
+    def _across_holes(self, error: Floats) -> Floats:
+        """Something of the epochs, (E, 3), in holes of the reference by straight lines between their ends."""
+        known = self.compared
+        if not known.any():
+            return error
+        return np.column_stack([np.interp(self.epoch_time, self.epoch_time[known], axis[known]) for axis in error.T])
 
     def _first(self, burn_in: int) -> int:
         if burn_in > self.first:
             raise ValueError(
                 f"scenario {self.name!r}: a detector looks back {burn_in} epochs, but there are {self.first} between "
-                f"the alignment and the onset at {self.timeline.start:g} s: begin later"
+                f"the alignment and the onset at {seconds(self.timeline.start)} s: begin later"
             )
         return self.first - burn_in
 
@@ -260,6 +334,24 @@ class RecordedScenario(Scenario):
     def velocity(self, burn_in: int = 0) -> Floats:
         """The velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s: the reference's, else the clean run's."""
         return self.true_velocity[self._first(burn_in) : self.last + 1]
+
+    def velocity_in_steps(self) -> Floats:
+        """The velocity at the moments of the timeline's steps, (M+1, 3), ENU, m/s.
+
+        Between epochs it is that of the inertial samples, which a straight line in time leads from the velocity at one
+        epoch to that at the next.
+        """
+        moments, _, epochs = self.timeline.steps
+        velocity = np.empty((len(moments), 3))
+        velocity[epochs] = self.velocity()
+        for k in np.flatnonzero(np.diff(epochs) > 1).tolist():
+            inside, ends = moments[epochs[k] + 1 : epochs[k + 1]], self.timeline.times[[k, k + 1]]
+            time, coasting = coast(self.model, self.clean, self.first + k + 1)
+            amiss = velocity[epochs[[k, k + 1]]] - coasting[[0, -1]]
+            for a in range(3):
+                between = np.interp(inside, time, coasting[:, a]) + np.interp(inside, ends, amiss[:, a])
+                velocity[epochs[k] + 1 : epochs[k + 1], a] = between
+        return velocity
 
     def track(self) -> Floats:
         """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""

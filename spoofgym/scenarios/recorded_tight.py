@@ -8,13 +8,14 @@ that of the log, or else the unspoofed run of the same filter.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.closed_loop import mechanize_epoch
+from spoofgym.navigation.closed_loop import mechanize_part
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
@@ -27,6 +28,7 @@ from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import TightCleanRun, tight_clean_run
 from spoofgym.scenarios.range_epochs import RangeEpochs
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.ranging import KUJUR, DrawnErrors, RangeErrors, pseudoranges
 from spoofgym.streams import RunStreams
 from spoofgym.tight_scenario import along, captured_ranges, disturbed_ranges
@@ -51,6 +53,10 @@ class RecordedRanges(RecordedScenario):
         errors: what the filter believes of slow errors and of the clock; its noise of code and rate is not read.
     """
 
+    doubts = (
+        "range rates of the wrong sign or unit (range_rate_mps), wrong ranges or ephemerides, ranges and IMU on "
+        "different clocks (imu_delay_s), a wrong mounting (imu_to_body_frd), an IMU that is worse than its grade"
+    )
     coupling = "tight"
     offers = (INERTIAL_SOLUTION, RANGES)
     clock_rate = 4.0
@@ -83,7 +89,7 @@ class RecordedRanges(RecordedScenario):
         start = int(self.epochs.fix[self.alignment.fix]) + 1
         stop = int(np.searchsorted(self.epochs.time, self._end, side="right"))
         if stop - start < 4:
-            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {self.align_time:g} s")
+            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s")
         return self.epochs.part(start, stop)
 
     @property
@@ -122,6 +128,7 @@ class RecordedRanges(RecordedScenario):
         return replace(
             steady,
             time=ranges.time,
+            intervals=np.diff(ranges.time, prepend=self.align_time),
             started=ranges.started,
             noise_variance=np.where(np.tile(ranges.geometry.present, 2), sigma**2, 1.0),
         )
@@ -155,13 +162,15 @@ class RecordedRanges(RecordedScenario):
     def clean(self) -> TightCleanRun:
         """The filter on the unspoofed ranges, from the alignment to the end of the log.
 
-        Without a reference it runs twice: along the fixes of the ranges, and along its own first solution, so that a
-        game, whose reference is the clean run, has the same lines of sight.
+        Without a reference, or with one that has holes, it runs twice: along the fixes of the ranges there, and along
+        its own first solution, so that a game, whose reference is the clean run, has the same lines of sight.
         """
-        run = self._clean_along(self.model)
-        self._check_clean(run)
-        if self._truth is None:
-            run = self._clean_along(replace(self.model, true_position=run.position[1:], true_velocity=run.velocity[1:]))
+        with self._refusing_divergence():
+            run = self._clean_along(self.model)
+            if self.log.reference is None or not self.compared.all():
+                position, velocity = self._known(0, run.position[1:]), self._known(1, run.velocity[1:])
+                run = self._clean_along(replace(self.model, true_position=position, true_velocity=velocity))
+        self._warn_of_large_innovations(run)
         return run
 
     def _clean_along(self, model: StrapdownModel) -> TightCleanRun:
@@ -188,7 +197,7 @@ class RecordedRanges(RecordedScenario):
         satellites, clock = self.ranges.geometry.position[first:stop], self.clean.state[first + 1 : stop + 1, CLOCK]
         return TightReplayNavigator(self._game_model(first), tight, satellites, clock, num_runs, slices, demands)
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def tight_model(self, burn_in: int = 0) -> TightModel:
         """The covariances of the game along the clean run, from epoch -burn_in on, every range used."""
         first, stop = self._first(burn_in), self.last + 1
@@ -202,27 +211,34 @@ class RecordedRanges(RecordedScenario):
         transition = np.empty((stop - first, NUM_NAVIGATION, NUM_STATES))
         noise = np.empty((stop - first, NUM_NAVIGATION, NUM_NAVIGATION))
         density = np.diag(model.filter_density[:NUM_NAVIGATION])
+        bounds, places = model.parts
+        one = np.empty((NUM_NAVIGATION, NUM_STATES))
         for k in range(first, stop):
             attitude, velocity, position = clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy()
-            interval = mechanize_epoch(
-                model.boundaries[k],
-                model.boundaries[k + 1],
-                0,
-                -clean.bias[k],
-                np.empty(0),
-                model.angular_rate,
-                model.specific_force,
-                model.step,
-                model.true_noise,
-                attitude,
-                velocity,
-                position,
-                np.empty((6, 3)),
-                np.empty(3),
-                transition[k - first],
-            )
-            phi, half = transition[k - first, :, :NUM_NAVIGATION], 0.5 * interval * density
-            noise[k - first] = phi @ half @ phi.T + half
+            total, gathered = np.eye(NUM_NAVIGATION, NUM_STATES), np.zeros((NUM_NAVIGATION, NUM_NAVIGATION))
+            for part in range(places[k], places[k + 1]):
+                length = mechanize_part(
+                    bounds[part],
+                    bounds[part + 1],
+                    -1,
+                    -clean.bias[k],
+                    np.empty(0),
+                    model.angular_rate,
+                    model.specific_force,
+                    model.step,
+                    model.true_noise,
+                    attitude,
+                    velocity,
+                    position,
+                    np.empty((6, 3)),
+                    np.empty(3),
+                    one,
+                )
+                phi, half = one[:, :NUM_NAVIGATION], 0.5 * length * density
+                total = phi @ total
+                total[:, NUM_NAVIGATION:] += one[:, NUM_NAVIGATION:]
+                gathered = phi @ (gathered + half) @ phi.T + half
+            transition[k - first], noise[k - first] = total, gathered
         return transition, noise
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.credible import AuxiliaryRule, CredibleModel, CredibleNavigator
+from spoofgym.burn_in_cache import kept_by_burn_in
+from spoofgym.navigation.credible import ANCHORING, AuxiliaryRule, CredibleModel, CredibleNavigator
 from spoofgym.navigation.credible_filter import CredibleTuning, credible_linear_model, standing_start
 from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
 from spoofgym.navigation.interface import Demands, Timeline
@@ -24,6 +25,7 @@ from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G
 from spoofgym.sensors.odometer import GRADES, Odometer, OdometerGrade, PlanarMotion, odometer_grade
 from spoofgym.sensors.receiver import Receiver, draw_noise
@@ -140,7 +142,7 @@ class SongRobot(Scenario):
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, self.receiver.interval, self.horizon)
+        return Timeline.steady(self.onset, self.receiver.interval, self.horizon)
 
     @property
     def bias_sigma(self) -> Floats:
@@ -170,9 +172,9 @@ class SongRobot(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         start = self.onset - burn_in * self.receiver.interval
-        return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
+        return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def motion(self, burn_in: int = 0) -> PlanarMotion:
         """The truth at the odometer's samples, from one interval before epoch -burn_in on."""
         steps = (burn_in + 1 + self.horizon) * self.tuning.samples
@@ -194,7 +196,7 @@ class SongRobot(Scenario):
         position = self._at_epochs(self.motion().position)
         return position - position[0]
 
-    @cache  # noqa: B019 - scenarios live as long as the program
+    @kept_by_burn_in
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """What offsets do to the filter from epoch -burn_in on, every fix used: exact."""
         return credible_linear_model(self.tuning, self.rule.anchoring != "free", self.times(burn_in))
@@ -266,10 +268,13 @@ def song_robot(
     validation.one_of(owner, "data", data, DATA)
     validation.one_of(owner, "noise", noise, NOISES)
     validation.one_of(owner, "odometer", odometer, tuple(GRADES))
-    sigma = validation.above(owner, "sigma", sigma)
-    horizon = validation.whole(owner, "horizon", horizon, 1)
+    sigma = validation.between(owner, "sigma", sigma, *SIGMAS)
+    horizon = validation.whole(owner, "horizon", horizon, 1, MOST_EPOCHS)
     onset = validation.finite(owner, "onset", onset)
-    rule = AuxiliaryRule(anchoring=auxiliary, credit=credit)
+    rule = AuxiliaryRule(
+        anchoring=validation.one_of(owner, "auxiliary", auxiliary, ANCHORING),
+        credit=validation.epochs(owner, "credit", credit),
+    )
     if auxiliary != "credited" and credit != 5:
         raise ValueError(f"{owner}: credit {credit} is of auxiliary 'credited', got auxiliary {auxiliary!r}")
     white = sigma if noise == "white" else WHITE_SHARE * sigma

@@ -10,7 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from spoofgym.arrays import Floats
+from spoofgym.arrays import Floats, Runs
+
+LARGEST = 2**28
+"""Bytes of text in a table at most, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that unpacks
+to more is not read on."""
+SHOWN = 200
+"""Characters of a file that a message quotes at most."""
 
 Limits = Mapping[str, tuple[float, float]]
 """Valid values, inclusive, of columns that have bounds."""
@@ -52,7 +58,7 @@ def read_table(
         if missing and (group in required or len(missing) < len(group)):
             raise ValueError(
                 f"{path}, line 1: column {missing[0]!r} is missing; needed together: {', '.join(group)}; "
-                f"found: {', '.join(header) or 'nothing'}"
+                f"found: {', '.join(header)[:SHOWN] or 'nothing'}"
             )
         if not missing:
             wanted += group
@@ -73,30 +79,48 @@ def read_table(
         wrong = np.flatnonzero((values[:, column] < low) | (values[:, column] > high))
         if len(wrong):
             bounds = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
-            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {values[wrong[0], column]:g}")
+            value = float(values[wrong[0], column])
+            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {value!r}")
     return {name: np.ascontiguousarray(values[:, column]) for column, name in enumerate(wanted)}
 
 
-def check_increasing(path: Path, time: Floats) -> None:
-    """Times of the lines of a table, (n,), s.
+def check_increasing(path: Path, time: Floats, lines: Runs | None = None) -> None:
+    """Refuse times that do not increase.
+
+    Args:
+        path: of the table.
+        time: (n,), s.
+        lines: of the file that they come from, (n,); None = one after the other from the second on.
 
     Raises:
-        ValueError: a line is not later than the one before it.
+        ValueError: a time is not later than the one before it.
     """
     late = np.flatnonzero(np.diff(time) <= 0.0)
     if len(late):
-        before, after = time[late[0]], time[late[0] + 1]
-        raise ValueError(f"{path}, line {late[0] + 3}: t_s must increase, got {after:.9g} after {before:.9g}")
+        line = late[0] + 3 if lines is None else lines[late[0] + 1]
+        others = f"; so it is in {len(late)} of {len(time)} lines" if len(late) > 1 else ""
+        raise ValueError(
+            f"{path}, line {line}: t_s must increase, got {seconds(time[late[0] + 1])} after "
+            f"{seconds(time[late[0]])}{others}"
+        )
+
+
+def seconds(time: float) -> str:
+    """A time for a message, to the microsecond, however large it is: those of Unix keep their digits."""
+    return np.format_float_positional(time, precision=6, trim="-")
 
 
 def _lines(path: Path) -> list[str]:
     """Lines of a plain or gzipped text file, without blank ones at its end."""
-    data = path.read_bytes()
     try:
-        if path.suffix == ".gz":
-            data = gzip.decompress(data)
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise ValueError(f"{path}: has more than {LARGEST} bytes of text, which is the limit; cut the log in parts")
         text = data.decode("utf-8-sig")
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: cannot be read: it is no text in UTF-8: {error.reason}") from None
+    except (OSError, EOFError, zlib.error) as error:
         raise ValueError(f"{path}: cannot be read: {error}") from None
     return text.rstrip().splitlines()
 
@@ -114,6 +138,6 @@ def _bad_value(path: Path, lines: list[str], wanted: list[str], places: list[int
                 valid = False
             if not valid:
                 return ValueError(
-                    f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()!r}"
+                    f"{path}, line {number}: {name} must be a finite number, got {cells[place].strip()[:SHOWN]!r}"
                 )
     return ValueError(f"{path}: cannot be read as a table of numbers")

@@ -60,7 +60,7 @@ def write_log(
     sensor = np.hstack([part @ NED_OF_ENU.T @ SENSOR_OF_FRD.T for part in (body[:, :3], body[:, 3:])])
     middle = truth.time[:-1] + 0.5 / RATE
     keep = np.ones(steps, dtype=bool) if gap is None else (middle < gap) | (middle > gap + 0.8)
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(exist_ok=True, parents=True)
     (folder / "log.toml").write_text(
         'name = "synthetic"\nimu_to_body_frd = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]\nimu_delay_s = 2.0\nstart_s = 5.0\n'
     )

@@ -1,0 +1,145 @@
+"""Which rows of a table of fixes are fixes, and which of their sigmas are known.
+
+Receivers go on writing rows while they have no fix: zeros in place of a position, or a sigma that no fix has. A single
+fix may lie where no vehicle can have been. Such rows are left out; from the log's start on that is told, by a warning.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.geodesy import position_difference
+from spoofgym.scenarios.log_warning import warn
+
+UNKNOWN_SIGMA = 99.0
+"""1 sigma from which on a number stands for "unknown", m and m/s: receivers write 99.99, 999, 9999, 4294967.295 or 1e9,
+and a fix of 99 m would tell a filter nothing."""
+UNMEASURED_SIGMA = 1e3
+"""1 sigma that the filter believes of a component that was not measured, m and m/s."""
+DEFAULT_SIGMA = {
+    **{"sd_n_m": 2.5, "sd_e_m": 2.5, "sd_d_m": 5.0},
+    **{"sd_vn_mps": 0.3, "sd_ve_mps": 0.3, "sd_vd_mps": 0.5},
+}
+"""1 sigma where the log states none, or 0, which receivers write where they do not know it, m and m/s."""
+FARTHEST = 50.0
+"""Error that a fix may have, m, beside the way that the vehicle may have gone."""
+FASTEST = 3.0
+"""Speed that the vehicle may have had for a short time, over its median speed."""
+WILD = 3
+"""Fixes in a row that are left out at most: what stays away longer may be true, or the attack that is in the log."""
+
+
+def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dict[str, Floats], Runs]:
+    """The rows of a table that are fixes.
+
+    Args:
+        path: of the table, for messages.
+        table: its columns, each (n,).
+        start: of the log, on the clock of the table, s.
+
+    Returns:
+        The columns, (k,) each, and the lines of the file that they come from, (k,).
+
+    Raises:
+        ValueError: fewer than two rows are left.
+    """
+    told = table["t_s"] >= start
+    no_position = (table["lat_deg"] == 0.0) & (table["lon_deg"] == 0.0)
+    _tell(path, no_position & told, "have lat_deg = lon_deg = 0, no fix, and are left out")
+    no_fix = _no_fix(table) & ~no_position
+    _tell(path, no_fix & told, f"have a horizontal sigma of {UNKNOWN_SIGMA:g} m or more, no fix, and are left out")
+    kept = np.flatnonzero(~no_position & ~no_fix)
+    if len(kept) >= 2:
+        wild = np.zeros(len(told), dtype=bool)
+        wild[kept] = wild_fixes(table["t_s"][kept], _position(table, kept))
+        _tell(path, wild & told, "lie where the vehicle cannot have been, by the rows around, and are left out")
+        kept = kept[~wild[kept]]
+    if len(kept) < 2:
+        raise ValueError(f"{path}: 2 rows with a fix are needed, got {len(kept)} of {len(told)}; line 2 is the first")
+    return {name: values[kept] for name, values in table.items()}, kept + 2
+
+
+def _position(table: dict[str, Floats], rows: Runs) -> Floats:
+    latitude, longitude = np.radians(table["lat_deg"][rows]), np.radians(table["lon_deg"][rows])
+    return np.column_stack([latitude, longitude, table["h_m"][rows]])
+
+
+def _no_fix(table: dict[str, Floats]) -> Flags:
+    if "sd_n_m" not in table:
+        return np.zeros(len(table["t_s"]), dtype=bool)
+    return np.asarray(np.maximum(table["sd_n_m"], table["sd_e_m"]) >= UNKNOWN_SIGMA)
+
+
+def _tell(path: Path, rows: Flags, what: str) -> None:
+    """Warn of rows, (n,), where there are any."""
+    if rows.any():
+        line = int(np.argmax(rows)) + 2
+        warn(path.parent, f"{path.name}: {rows.sum()} of {len(rows)} rows {what}; the first is line {line}", line)
+
+
+def known_sigmas(path: Path, rows: dict[str, Floats], lines: Runs, start: float) -> dict[str, Floats]:
+    """Fixes with a sigma in place of each one that is unknown.
+
+    A sigma of 0 becomes the default, since the best fix there is would be the least likely meaning. A component whose
+    sigma stands for "unknown", such as the height of a fix in two dimensions, counts as not measured.
+
+    Args:
+        path: of the table, for messages.
+        rows: its columns, each (k,).
+        lines: of the file, (k,).
+        start: of the log, on the clock of the table, s.
+    """
+    zero = {name: rows[name] == 0.0 for name in DEFAULT_SIGMA if name in rows}
+    any_zero = np.logical_or.reduce([np.zeros(len(lines), dtype=bool), *zero.values()])
+    told = np.flatnonzero(any_zero & (rows["t_s"] >= start))
+    if len(told):
+        which = [name for name, column in zero.items() if column[told].any()]
+        line = int(lines[told[0]])
+        warn(
+            path.parent,
+            f"{path.name}: {len(told)} of {len(lines)} rows have a sigma of 0 ({', '.join(which)}), which is taken as "
+            f"unknown: {', '.join(f'{DEFAULT_SIGMA[name]:g}' for name in which)}; the first is line {line}",
+            line,
+        )
+    result = dict(rows)
+    for name, unknown in zero.items():
+        result[name] = np.where(unknown, DEFAULT_SIGMA[name], rows[name])
+        result[name][rows[name] >= UNKNOWN_SIGMA] = UNMEASURED_SIGMA
+    return result
+
+
+def wild_fixes(time: Floats, position: Floats) -> Flags:
+    """Fixes that are out of reach from the one before, where the track goes on from there up to `WILD` fixes later.
+
+    Args:
+        time: (n,), s, not decreasing.
+        position: latitude rad, longitude rad, height m, (n, 3).
+
+    Returns:
+        (n,).
+    """
+    track = position_difference(position, position[len(position) // 2])
+    step, duration = np.linalg.norm(np.diff(track, axis=0), axis=1), np.diff(time)
+    moved = duration > 0.0
+    speed = FASTEST * float(np.median(step[moved] / duration[moved])) if moved.any() else 0.0
+    number, wild = len(time), np.zeros(len(time), dtype=bool)
+
+    def reached(one: int, other: int) -> bool:
+        way = float(np.linalg.norm(track[other] - track[one]))
+        return way <= speed * (time[other] - time[one]) + FARTHEST
+
+    handled = 0
+    for place in np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1:
+        if place <= handled:
+            continue
+        returns = (other for other in range(place + 1, min(place + WILD + 1, number)) if reached(place - 1, other))
+        if (back := next(returns, None)) is not None:
+            wild[place:back], handled = True, back
+        elif place <= WILD < number - place:
+            wild[:place] = True
+        elif number - place <= WILD < place:
+            wild[place:], handled = True, number
+    return wild

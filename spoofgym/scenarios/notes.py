@@ -1,0 +1,178 @@
+"""``log.toml`` of a recorded log: what a reader must know of it, and notes that nobody reads."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spoofgym.arrays import Floats
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+SETTINGS = ("name", "imu_to_body_frd", "start_s", "imu_delay_s", "gnss_delay_s", "antenna_lever_arm_m")
+REMARKS = (
+    *("vehicle", "source", "licence", "license", "date", "comment", "note", "week", "time", "static"),
+    *("imu", "imu_grade", "gyro_noise", "accel_noise", "gnss", "reference", "ranges", "ranges_sbas", "sky"),
+    *("wheels", "attitude", "aux", "gnss_spoofed", "attack", "victim", "attack_start_s", "attack_end_s"),
+    *("first_offset_n_m", "first_offset_e_m", "largest_offset_m", "first_effect_s", "power_step_s"),
+    *("pull_start_s", "pull_full_s", "pull_slows_s", "pull_end_s", "pull_m", "range_rate_bias_mps"),
+    *("antenna_lat_deg", "antenna_lon_deg", "antenna_h_m", "rrt0_s", "iono_alpha", "iono_beta"),
+)
+"""Keys about the log that nothing reads; others lie in the table ``[notes]``."""
+NOTES = "notes"
+CLOSE = 0.5
+"""Similarity from which a key is taken for a mistyped one (`difflib.get_close_matches`)."""
+SURE = 0.8
+"""The same where other keys are welcome."""
+VALID = f"{', '.join(SETTINGS)}; remarks belong in a table [{NOTES}]"
+LONGEST = 1_000_000
+"""Bytes of a ``log.toml`` at most."""
+ROTATION_TOLERANCE = 1e-3
+FARTHEST_ANTENNA = 100.0
+"""Longest lever arm per axis, m."""
+
+ENU_OF_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""East, north, up from north, east, down; and right, forward, up from forward, right, down."""
+
+
+class Notes:
+    """The settings in a ``log.toml``, each checked where it is asked for."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file.
+
+        Raises:
+            ValueError: it is missing, too large or no TOML, or has a key that is none of the format.
+        """
+        self.path = path
+        self._values = _read(path)
+        for key, value in self._values.items():
+            if fault := _table_fault(key, value) if isinstance(value, dict) else _key_fault(key):
+                raise ValueError(f"{path}: {fault}; valid are {VALID}")
+
+    def __contains__(self, key: str) -> bool:
+        """Whether the file has this key."""
+        return key in self._values
+
+    def name(self, default: str) -> str:
+        """Of the log.
+
+        Raises:
+            ValueError: it is no text.
+        """
+        value = self._values.get("name", default)
+        if not isinstance(value, str):
+            raise ValueError(f"{self.path}: name must be a text, got {value!r:.100}")
+        return value
+
+    def seconds(self, key: str, default: float | None) -> float:
+        """A time; None as default = it must be there.
+
+        Raises:
+            ValueError: it is missing, or no finite number.
+        """
+        value = self._values.get(key, default)
+        if value is None:
+            raise ValueError(f"{self.path}: {key} is missing; it must be a finite number of seconds")
+        if not _is_number(value):
+            raise ValueError(f"{self.path}: {key} must be a finite number of seconds, got {value!r:.100}")
+        return float(value)
+
+    def lever_arm(self) -> Floats:
+        """From the IMU to the antenna, body right, forward, up, (3,), m.
+
+        Raises:
+            ValueError: it is not three numbers, or too long.
+        """
+        value = self._values.get("antenna_lever_arm_m", [0.0, 0.0, 0.0])
+        fits = isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))
+        if not fits or max(map(abs, value)) > FARTHEST_ANTENNA:
+            raise ValueError(
+                f"{self.path}: antenna_lever_arm_m must be 3 numbers (metres from the IMU to the antenna, body "
+                f"forward, right, down) between {-FARTHEST_ANTENNA:g} and {FARTHEST_ANTENNA:g}, got {value!r:.100}"
+            )
+        return np.asarray(ENU_OF_NED @ np.array(value, dtype=np.float64))
+
+    def mounting(self) -> Floats | None:
+        """Rotation from sensor axes to body right, forward, up, (3, 3); None = unknown.
+
+        Raises:
+            ValueError: the key is missing, or its value is no rotation.
+        """
+        key = "imu_to_body_frd"
+        if key not in self._values:
+            raise ValueError(f"{self.path}: {key} is missing; where the mounting is unknown it must be [], empty")
+        value = self._values[key]
+        if value == []:
+            return None
+        message = (
+            f"{self.path}: {key} must be a rotation, 3 rows of 3 numbers (body forward, right, down), got "
+            f"{value!r:.200}"
+        )
+        rows = value if isinstance(value, list) and all(isinstance(row, list) for row in value) else []
+        if len(rows) != 3 or not all(len(row) == 3 and all(map(_is_number, row)) for row in rows):
+            raise ValueError(message)
+        left, scale, right = np.linalg.svd(np.array(rows, dtype=np.float64))
+        rotation: Floats = left @ right
+        if np.any(np.abs(scale - 1.0) > ROTATION_TOLERANCE) or np.linalg.det(rotation) < 0.0:
+            raise ValueError(message)
+        return np.asarray(ENU_OF_NED @ rotation)
+
+
+def _is_number(value: object) -> bool:
+    """Whether a value is a finite number, as a float too."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _read(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise ValueError(f"{path} is missing")
+    if path.stat().st_size > LONGEST:
+        raise ValueError(f"{path}: has {path.stat().st_size} bytes; valid are {LONGEST} at most")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ValueError(f"{path}: not valid TOML: {error}") from None
+    except ValueError as error:  # e.g. a number of more digits than Python converts
+        raise ValueError(f"{path}: not valid TOML: {error}") from None
+
+
+def _key_fault(key: str) -> str | None:
+    """What is wrong with a key of the file; None = nothing."""
+    if key in (*SETTINGS, *REMARKS, NOTES):
+        return None
+    meant = nearest(key, CLOSE)
+    return f"unknown key {key!r}" + ("" if meant is None else f", did you mean {meant!r}?")
+
+
+def _table_fault(table: str, content: dict[str, Any]) -> str | None:
+    """What is wrong with a table of the file; None = nothing.
+
+    In TOML whatever follows ``[notes]`` belongs to it: a setting that is added at the end of a file.
+    """
+    for key, value in content.items():
+        if not isinstance(value, str) and (meant := nearest(key, SURE)) in SETTINGS:
+            return f"{meant!r} must stand above all tables, got {key!r} in [{table}]"
+    return None if table == NOTES else f"unknown table [{table}]"
+
+
+def nearest(key: str, similarity: float) -> str | None:
+    """The key of the format that a key resembles most, whatever its case; None = none is so similar."""
+    lower = key.lower()
+    if lower in REMARKS:
+        return lower
+    found = difflib.get_close_matches(lower, SETTINGS, 1, similarity)
+    return found[0] if found else None
