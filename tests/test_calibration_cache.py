@@ -3,6 +3,8 @@
 import dataclasses
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -202,6 +204,17 @@ def test_the_digest_covers_what_decides_a_result(monkeypatch, tmp_path):
         (copy / name).write_text((copy / name).read_text() + "\n")
         digests.add(calibration_cache._source())
     assert len(digests) == 12
+
+
+def test_no_module_of_the_simulation_is_left_out_of_the_digest():
+    """What calibration imports is in the digest, but for what decides no clean statistic."""
+    command = "import sys, spoofgym.calibration; print(*(name for name in sys.modules if name.startswith('spoofgym.')))"
+    names = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True).stdout.split()
+    package = Path(spoofgym.__file__).parent
+    covered = {path for pattern in calibration_cache.SOURCES for path in package.glob(pattern)}
+    left_out = {name for name in names if Path(sys.modules[name].__file__) not in covered}
+    without_effect = ("responses", "kernels", "immutable", "cache_folder", "calibration_cache")
+    assert {name for name in left_out if name.split(".")[1] not in without_effect} == set()
 
 
 def test_objects_that_their_name_does_not_build_stay_in_memory(place):
