@@ -157,8 +157,9 @@ def measure_arl0(
     """ARL₀ at a given threshold, on at least ``min_epochs`` clean epochs.
 
     Raises:
-        ValueError: every run alarms in its burn-in, or ``min_epochs`` is not a positive finite number.
+        ValueError: every run alarms in its burn-in, or ``threshold`` or ``min_epochs`` is not a positive finite number.
     """
+    validation.above("calibration", "threshold", threshold)
     validation.above("calibration", "min_epochs", min_epochs)
     rng = np.random.default_rng(seed)
     alarms = at_risk = 0

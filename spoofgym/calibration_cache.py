@@ -1,7 +1,9 @@
 """Results of calibration on disk, so that a program need not wait for clean runs that an earlier one has made.
 
 One JSON file per result, in `cache_folder`. Its name is a SHA-256 over everything that decides the result, the source
-of the simulation included: a result is used only by the code that made it. The folder can be deleted at any time.
+of the simulation included: a result is used only by the code that made it. Each file holds a checksum over its name and
+its content: a file that was damaged, changed by hand or renamed is as good as none, and the result is computed and
+written again. The folder can be deleted at any time.
 """
 
 from __future__ import annotations
@@ -31,7 +33,10 @@ SOURCES = (
     *("sensors/*.py", "navigation/*.py", "detectors/*.py", "scenarios/*.py", "attacks/*.py"),
     *("simulation.py", "scenario.py", "tight_scenario.py", "trajectory.py", "geodesy.py", "streams.py", "arrays.py"),
     *("specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
+    *("quadratic_form.py", "clean_starts.py", "burn_in_cache.py", "parallel.py"),
 )
+LARGEST_FILE = 2**16
+"""Characters; a result takes some hundreds."""
 
 
 @dataclass(frozen=True)
@@ -74,18 +79,26 @@ def key(*parts: str) -> str:
     return hashlib.sha256(json.dumps([SOURCE, np.__version__, scipy.__version__, *parts]).encode()).hexdigest()
 
 
+def _checksum(name: str, remark: str, setting: Setting) -> str:
+    """Over all that a file says, and its name."""
+    return hashlib.sha256(json.dumps([name, remark, dataclasses.asdict(setting)]).encode()).hexdigest()
+
+
 def load(name: str) -> Setting | None:
-    """The result of this name; None where there is none, or its file is damaged."""
+    """The result of this name; None where there is none, or its file is not as `store` wrote it."""
     place = folder()
     if place is None or not SOURCE:
         return None
     try:
-        setting = Setting(**json.loads((place / f"{name}.json").read_text(encoding="utf-8"))["setting"])
-    except (OSError, ValueError, TypeError, KeyError):
+        with (place / f"{name}.json").open(encoding="utf-8") as file:
+            content = json.loads(file.read(LARGEST_FILE))
+        setting = Setting(**content["setting"])
+        whole = content["checksum"] == _checksum(name, content["what"], setting)
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
     values = [value for value in dataclasses.astuple(setting) if value is not None]
     sound = values and all(isinstance(value, float) and math.isfinite(value) for value in values)
-    return setting if sound and (setting.threshold is None or setting.threshold > 0.0) else None
+    return setting if whole and sound and (setting.threshold is None or setting.threshold > 0.0) else None
 
 
 def store(name: str, setting: Setting, remark: str) -> None:
@@ -93,15 +106,16 @@ def store(name: str, setting: Setting, remark: str) -> None:
     place = folder()
     if place is None or not SOURCE:
         return
-    content = json.dumps({"what": remark, "setting": dataclasses.asdict(setting)}, indent=2) + "\n"
+    checksum = _checksum(name, remark, setting)
+    content = {"what": remark, "setting": dataclasses.asdict(setting), "checksum": checksum}
     with suppress(OSError):
         place.mkdir(parents=True, exist_ok=True)
         handle, draft = tempfile.mkstemp(suffix=".draft", dir=place)
         try:
             with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(content)
+                file.write(json.dumps(content, indent=2) + "\n")
             Path(draft).replace(place / f"{name}.json")
-        except OSError:
+        except BaseException:
             Path(draft).unlink(missing_ok=True)
             raise
 

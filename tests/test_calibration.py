@@ -201,3 +201,9 @@ def test_an_arl0_must_be_more_than_one_epoch(arl0):
 def test_too_few_alarms_are_refused():
     with pytest.raises(ValueError, match="first_alarms must be"):
         calibrate(Acna(), WHITE, 100.0, first_alarms=9)
+
+
+@pytest.mark.parametrize("threshold", [np.nan, np.inf, 0.0, -1.0])
+def test_no_arl0_is_measured_at_a_threshold_that_decides_nothing(threshold):
+    with pytest.raises(ValueError, match=r"threshold must be .* greater than 0"):
+        measure_arl0(Snapshot(), WHITE, threshold, min_epochs=1)

@@ -2,6 +2,9 @@
 
 import dataclasses
 import json
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,6 +59,8 @@ def test_a_result_comes_back_to_the_last_bit(place):
         '{"setting": {"threshold": -1.0}}',
         '{"setting": {"other": 1.0}}',
         b"\xff\xfe",
+        pytest.param("[" * 50_000, id="nested"),
+        pytest.param("1" * 50_000, id="digits"),
     ],
 )
 def test_a_damaged_file_is_none(place, content):
@@ -65,6 +70,65 @@ def test_a_damaged_file_is_none(place, content):
     assert calibration_cache.load(NAME) is None
     calibration_cache.store(NAME, SETTING, "")
     assert calibration_cache.load(NAME) == SETTING
+
+
+CHANGES = [
+    lambda text: text.replace("12.5", "13.5"),
+    lambda text: text.replace("12.5", "12.500000000000002"),
+    lambda text: text.replace("12.5", "NaN"),
+    lambda text: text.replace("12.5", '"12.5"'),
+    lambda text: text.replace("12.5", "null"),
+    lambda text: text.replace("1000.25", "1000"),
+    lambda text: text.replace('"slope"', '"low"'),
+    lambda text: text.replace("a remark", "another remark"),
+    lambda text: text.replace('"checksum"', '"sum"'),
+    lambda text: text[: len(text) // 2],
+    lambda text: text + text,
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=range(len(CHANGES)))
+def test_a_well_formed_file_that_was_changed_is_none(place, change):
+    calibration_cache.store(NAME, SETTING, "a remark")
+    path = place / f"{NAME}.json"
+    assert change(path.read_text()) != path.read_text()
+    path.write_text(change(path.read_text()))
+    assert calibration_cache.load(NAME) is None
+
+
+def test_every_character_counts(place):
+    """Each flipped in turn: the setting comes back as it was, or not at all."""
+    calibration_cache.store(NAME, SETTING, "a remark")
+    path = place / f"{NAME}.json"
+    whole = path.read_bytes()
+    for at in range(len(whole)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        assert calibration_cache.load(NAME) in (None, SETTING)
+        path.write_bytes(whole[:at])
+        assert calibration_cache.load(NAME) in (None, SETTING)
+
+
+def test_a_result_under_another_name_is_none(place):
+    calibration_cache.store(NAME, SETTING, "")
+    (place / f"{NAME}.json").rename(place / f"{'1' * 64}.json")
+    assert calibration_cache.load("1" * 64) is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [*CHANGES[-2:], lambda text: text.replace('"threshold": ', '"threshold": 1')],
+    ids=["cut", "twice", "other"],
+)
+def test_a_changed_threshold_is_computed_and_written_again(place, monkeypatch, change):
+    scenario, text = make_scenario(SCENARIO), "windowed:n=3,arl0=50"
+    right = calibrated(make_detector(text), scenario)
+    (path,) = place.glob("*.json")
+    whole = path.read_text()
+    path.write_text(change(whole))
+    new_program(monkeypatch, may_calibrate=True)
+    again = calibrated(make_detector(text), scenario)
+    assert (again.threshold, again.arl0) == (right.threshold, right.arl0)
+    assert path.read_text() == whole
 
 
 def test_a_folder_that_cannot_be_written_is_no_error(monkeypatch, tmp_path):
@@ -81,6 +145,16 @@ def test_a_write_that_fails_leaves_nothing(place, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", full)
     calibration_cache.store(NAME, SETTING, "")
+    assert list(place.iterdir()) == []
+
+
+def test_an_interrupted_write_leaves_nothing(place, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        calibration_cache.store(NAME, SETTING, "")
     assert list(place.iterdir()) == []
 
 
@@ -128,6 +202,17 @@ def test_the_digest_covers_what_decides_a_result(monkeypatch, package_copy):
         (copy / name).write_text((copy / name).read_text() + "\n")
         digests.add(calibration_cache._source())
     assert len(digests) == 12
+
+
+def test_no_module_of_the_simulation_is_left_out_of_the_digest():
+    """What calibration imports is in the digest, but for what decides no clean statistic."""
+    command = "import sys, spoofgym.calibration; print(*(name for name in sys.modules if name.startswith('spoofgym.')))"
+    names = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True).stdout.split()
+    package = Path(spoofgym.__file__).parent
+    covered = {path for pattern in calibration_cache.SOURCES for path in package.glob(pattern)}
+    left_out = {name for name in names if Path(sys.modules[name].__file__) not in covered}
+    without_effect = ("responses", "kernels", "immutable", "cache_folder", "calibration_cache")
+    assert {name for name in left_out if name.split(".")[1] not in without_effect} == set()
 
 
 def test_objects_that_their_name_does_not_build_stay_in_memory(place):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba import typeof
 
 from spoofgym.attacks import ATTACKS, make_attack
 from spoofgym.attacks.base import Attack
@@ -170,6 +171,18 @@ def test_what_is_never_written_is_shared_by_deep_copies() -> None:
         assert other.scenario is original.scenario
         assert other.navigator is not original.navigator
         assert other.navigator.model is original.navigator.model
+
+
+@pytest.mark.parametrize(("text", "fidelity"), GAMES)
+def test_arrays_of_a_navigator_lie_in_memory_as_before(text: str, fidelity: str) -> None:
+    """The kernels are compiled for layouts: a copy must not ask for another one."""
+    original = Simulation(make_scenario(text), fidelity=fidelity)
+    original.reset()
+    for how, make_copy in COPY.items():
+        other = make_copy(original)
+        for name, value in vars(original.navigator).items():
+            if isinstance(value, np.ndarray):
+                assert typeof(getattr(other.navigator, name)) == typeof(value), f"{how}: {name}"
 
 
 def test_a_shallow_copy_that_is_bound_anew_shares_no_memory() -> None:

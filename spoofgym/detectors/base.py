@@ -168,10 +168,13 @@ def require_threshold(detector: Detector) -> float:
         raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
     for part in (*detector.members, detector):
         given: object = part.threshold
-        number = isinstance(given, float | int | np.integer | np.floating)
-        if given is not None and not (number and 0.0 < given < np.inf):  # type: ignore[operator]
+        if given is not None and not _positive(given):
             raise ValueError(f"detector {part.name!r}: threshold must be a finite number greater than 0, got {given}")
     return detector.threshold
+
+
+def _positive(value: object) -> bool:
+    return isinstance(value, float | int | np.integer | np.floating) and bool(0.0 < value < np.inf)
 
 
 def seen_dimension(detector: Detector, dimension: int, ranges: bool) -> int:

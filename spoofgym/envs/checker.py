@@ -14,7 +14,7 @@ what Gymnasium documents and `gymnasium.vector.SyncVectorEnv` does:
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -24,10 +24,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from spoofgym.envs.checker_comparison import Returned, Trace, check_flags, check_infos, check_observation, compare
+
 MakeVector = Callable[[int, AutoresetMode], VectorEnv]
 MakeSingle = Callable[[], gym.Env]
 SampleActions = Callable[[VectorEnv], NDArray[Any]]
-Trace = list[tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]]
 
 
 def check_vector_env(
@@ -51,6 +52,7 @@ def check_vector_env(
     - nothing returned shares memory with what an earlier call returned, or is changed by a later call;
     - infos hold no NaN;
     - seeds are a number, a sequence with a number or None per lane, or None, where the random streams go on;
+    - ``np_random_seed`` tells the seed of each lane, and ``np_random`` its generator;
     - bad seeds and masks, and in the mode DISABLED a step of a lane that is over, raise an exception.
 
     Spaces must be those whose samples are arrays (Box, Discrete, MultiDiscrete, MultiBinary).
@@ -164,14 +166,14 @@ def _check_against_singles(
     vector, singles = make_vector(num_envs, mode), _Singles(make_single, num_envs, mode)
     everyone = np.ones(num_envs, dtype=bool)
     trace: Trace = []
-    earlier = _Returned()
+    earlier = Returned()
     ends = 0
     try:
         where = f"mode {mode.value}, reset"
         observation, info = vector.reset(seed=seed)
         infos = singles.reset([seed + i for i in range(num_envs)], everyone)
-        _check_observation(vector, observation, singles.observations, where)
-        _check_infos(info, infos, where)
+        check_observation(vector, observation, singles.observations, where)
+        check_infos(info, infos, where)
         earlier.check((observation, info), where)
         for number, batch in enumerate(actions, start=1):
             where = f"mode {mode.value}, step {number}"
@@ -179,9 +181,9 @@ def _check_against_singles(
             result = vector.step(given)
             assert np.array_equal(given, batch[:num_envs]), f"{where}: the actions were changed"
             rewards, terminations, truncations, infos = singles.step(batch[:num_envs])
-            _check_observation(vector, result[0], singles.observations, where)
-            _check_flags(result[1:4], (rewards, terminations, truncations), where)
-            _check_infos(result[4], infos, where)
+            check_observation(vector, result[0], singles.observations, where)
+            check_flags(result[1:4], (rewards, terminations, truncations), where)
+            check_infos(result[4], infos, where)
             earlier.check(result, where)
             trace.append(copy.deepcopy(result))
             ends += int(np.sum(np.logical_or(terminations, truncations)))
@@ -193,114 +195,14 @@ def _check_against_singles(
                     where += ", reset of some lanes"
                     observation, info = vector.reset(options={"reset_mask": mask.copy()})
                     infos = singles.reset([None] * num_envs, mask)
-                    _check_observation(vector, observation, singles.observations, where)
-                    _check_infos(info, infos, where)
+                    check_observation(vector, observation, singles.observations, where)
+                    check_infos(info, infos, where)
                     earlier.check((observation, info), where)
         assert ends > 0, f"mode {mode.value}: no episode ended in {len(actions)} steps; check with a larger num_steps"
     finally:
         vector.close()
         singles.close()
     return trace
-
-
-def _check_observation(vector: VectorEnv, ours: Any, expected: Sequence[Any], where: str) -> None:
-    assert isinstance(ours, np.ndarray), f"{where}: the observation is {type(ours)}, no array"
-    space = vector.observation_space
-    assert ours.dtype == space.dtype, f"{where}: the observation's dtype is {ours.dtype}, its space's {space.dtype}"
-    assert ours.shape == space.shape, f"{where}: the observation's shape is {ours.shape}, its space's {space.shape}"
-    assert space.contains(ours), f"{where}: the observation lies outside its space: {ours}"
-    for lane, lane_expected in enumerate(expected):
-        assert np.array_equal(ours[lane], lane_expected), (
-            f"{where}, lane {lane}: the observation is {ours[lane]}, that of the single environment {lane_expected}"
-        )
-
-
-def _check_flags(ours: tuple[Any, ...], expected: tuple[Any, ...], where: str) -> None:
-    for name, got, wanted in zip(("reward", "terminated", "truncated"), ours, expected, strict=True):
-        assert isinstance(got, np.ndarray), f"{where}: {name} is {type(got)}, no array"
-        assert got.shape == (len(wanted),), f"{where}: {name} has shape {got.shape}, not ({len(wanted)},)"
-        right = np.issubdtype(got.dtype, np.floating) if name == "reward" else got.dtype == np.bool_
-        assert right, f"{where}: {name} has dtype {got.dtype}"
-        for lane, value in enumerate(wanted):
-            assert got[lane] == value, (
-                f"{where}, lane {lane}: {name} is {got[lane]}, that of the single environment {value}"
-            )
-
-
-def _check_infos(ours: dict[str, Any], expected: list[dict[str, Any]], where: str, key: str = "info") -> None:
-    """Gymnasium's layout: each key that any lane has, as an array or a dict of them, and ``_key``, who has it."""
-    assert isinstance(ours, dict), f"{where}: {key} is {type(ours)}, no dict"
-    wanted = {name for info in expected for name in info}
-    assert set(ours) == wanted | {f"_{name}" for name in wanted}, (
-        f"{where}: the keys of {key} are {sorted(ours)}; those of single environments are "
-        f"{sorted(wanted)}, each with a mask _key beside it"
-    )
-    for name in wanted:
-        mask, path = ours[f"_{name}"], f"{key}[{name!r}]"
-        has = np.array([name in info for info in expected])
-        assert isinstance(mask, np.ndarray), f"{where}: the mask of {path} is {type(mask)}, no array"
-        assert mask.dtype == np.bool_, f"{where}: the mask of {path} has dtype {mask.dtype}, not bool"
-        assert np.array_equal(mask, has), (
-            f"{where}: the mask of {path} is {mask}, lanes of single environments have {has}"
-        )
-        values = [info.get(name) for info in expected]
-        if any(isinstance(value, dict) for value in values):
-            _check_infos(ours[name], [value or {} for value in values], where, path)
-            continue
-        assert isinstance(ours[name], np.ndarray), f"{where}: {path} is {type(ours[name])}, no array"
-        assert len(ours[name]) == len(expected), (
-            f"{where}: {path} has {len(ours[name])} entries for {len(expected)} lanes"
-        )
-        assert not _has_nan(ours[name]), f"{where}: {path} holds NaN: {ours[name]}"
-        for lane in np.flatnonzero(has):
-            got, value = ours[name][lane], values[lane]
-            assert np.array_equal(got, value), (  # type: ignore[arg-type]
-                f"{where}, lane {lane}: {path} is {got!r}, that of the single environment {value!r}"
-            )
-
-
-def _has_nan(value: Any) -> bool:
-    array = np.asarray(value)
-    if array.dtype == object:
-        return any(item is not None and not isinstance(item, str) and _has_nan(item) for item in array.ravel())
-    return bool(np.issubdtype(array.dtype, np.inexact) and np.isnan(array).any())
-
-
-def _arrays(value: Any) -> Iterator[NDArray[Any]]:
-    """All arrays inside what a call returned, those in object arrays too."""
-    if isinstance(value, dict):
-        for item in value.values():
-            yield from _arrays(item)
-    elif isinstance(value, tuple | list):
-        for item in value:
-            yield from _arrays(item)
-    elif isinstance(value, np.ndarray):
-        yield value
-        if value.dtype == object:
-            yield from _arrays(list(value.ravel()))
-
-
-class _Returned:
-    """What the last call returned, and how it looked then."""
-
-    def __init__(self) -> None:
-        self._last: list[NDArray[Any]] = []
-        self._copies: list[NDArray[Any]] = []
-
-    def check(self, result: Any, where: str) -> None:
-        """Compare with the call before, then remember this one."""
-        arrays = list(_arrays(result))
-        for before, snapshot in zip(self._last, self._copies, strict=True):
-            unchanged = all(a is b for a, b in zip(before.ravel(), snapshot.ravel(), strict=True))
-            if before.dtype != object:
-                unchanged = np.array_equal(before, snapshot, equal_nan=before.dtype.kind in "fc")
-            assert unchanged, f"{where}: this call changed what an earlier one returned: {snapshot} became {before}"
-            for array in arrays:
-                assert not np.shares_memory(array, before), (
-                    f"{where}: this call's result shares memory with an earlier one's"
-                )
-        self._last = arrays
-        self._copies = [array.copy() for array in arrays]
 
 
 def _play(vector: VectorEnv, seed: int, actions: list[NDArray[Any]]) -> Trace:
@@ -327,7 +229,7 @@ def _check_repeats(
     vector = make_vector(num_envs, mode)
     try:
         for kind in ("a new environment", "the same environment, reset with the same seed"):
-            _compare(trace, _play(vector, seed, actions), num_envs, f"mode {mode.value}, {kind}")
+            compare(trace, _play(vector, seed, actions), num_envs, f"mode {mode.value}, {kind}")
     finally:
         vector.close()
     for number in (1, num_envs + 2):
@@ -336,34 +238,7 @@ def _check_repeats(
             again = _play(vector, seed, actions)
         finally:
             vector.close()
-        _compare(trace, again, min(number, num_envs), f"mode {mode.value}, {number} lanes instead of {num_envs}")
-
-
-def _compare(first: Trace, second: Trace, lanes: int, where: str) -> None:
-    names = ("observation", "reward", "terminated", "truncated")
-    for number, (one, other) in enumerate(zip(first, second, strict=True), start=1):
-        for lane in range(lanes):
-            for name, a, b in zip(names, one[:4], other[:4], strict=True):
-                same = np.array_equal(a[lane], b[lane])
-                assert same, f"{where}: at step {number} {name} of lane {lane} is {b[lane]} instead of {a[lane]}"
-            info, again = _lane(one[4], lane), _lane(other[4], lane)
-            assert _equal(info, again), (
-                f"{where}: at step {number} the info of lane {lane} is {again} instead of {info}"
-            )
-
-
-def _lane(info: dict[str, Any], lane: int) -> dict[str, Any]:
-    return {
-        name: _lane(value, lane) if isinstance(value, dict) else value[lane]
-        for name, value in info.items()
-        if f"_{name}" in info and info[f"_{name}"][lane]
-    }
-
-
-def _equal(one: Any, other: Any) -> bool:
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_equal(one[key], other[key]) for key in one)
-    return np.array_equal(one, other)
+        compare(trace, again, min(number, num_envs), f"mode {mode.value}, {number} lanes instead of {num_envs}")
 
 
 def _check_seeds(
@@ -386,16 +261,27 @@ def _check_seeds(
             where = f"seed: {kind}"
             observation, info = vector.reset(seed=given)
             infos = singles.reset(seeds, everyone)
-            _check_observation(vector, observation, singles.observations, where)
-            _check_infos(info, infos, where)
+            check_observation(vector, observation, singles.observations, where)
+            check_infos(info, infos, where)
+            _check_generators(vector, singles, where)
             actions = sample(vector)
             result = vector.step(actions)
             singles.step(actions)
-            _check_observation(vector, result[0], singles.observations, f"{where}, first step")
+            check_observation(vector, result[0], singles.observations, f"{where}, first step")
         vector.reset()  # fresh entropy goes on somewhere: it must work
     finally:
         vector.close()
         singles.close()
+
+
+def _check_generators(vector: VectorEnv, singles: _Singles, where: str) -> None:
+    told, expected = vector.np_random_seed, tuple(env.np_random_seed for env in singles.envs)
+    assert isinstance(told, tuple), f"{where}: np_random_seed is {told!r}, no tuple of the lanes' seeds"
+    assert told == expected, f"{where}: np_random_seed is {told}, those of the single environments are {expected}"
+    generators = vector.np_random
+    assert isinstance(generators, tuple), f"{where}: np_random is {generators!r}, no tuple of the lanes' generators"
+    right = len(generators) == len(expected) and all(isinstance(item, np.random.Generator) for item in generators)
+    assert right, f"{where}: np_random is {generators}, not a generator for each of {len(expected)} lanes"
 
 
 def _check_refusals(make_vector: MakeVector, num_envs: int, seed: int, sample: SampleActions) -> None:

@@ -132,7 +132,8 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self._all = np.arange(num_envs)
         self._done = np.zeros(num_envs, dtype=bool)
         self._started = np.zeros(num_envs, dtype=bool)
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._generators: dict[int, np.random.Generator] = {}
+        self._seeds: dict[int, int] = {}
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -160,14 +161,34 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         if len(seeds) != self.num_envs:
             raise ValueError(f"{owner}: seed must be one number or {self.num_envs} of them, got {len(seeds)}")
         for lane in lanes:
-            if seeds[lane] is not None or self._generators[lane] is None:
-                generator, _ = seeding.np_random(seeds[lane])
-                self._generators[lane] = generator
-                self.game.simulation.streams.replace(int(lane), generator)
+            if seeds[lane] is not None or lane not in self._generators:
+                self._seed_lane(int(lane), seeds[lane])
         self.game.reset(lanes)
         self._done[lanes] = False
         self._started[lanes] = True
         return self.game.observation(), self._reset_info(mask)
+
+    def _seed_lane(self, lane: int, seed: int | None) -> None:
+        self._generators[lane], self._seeds[lane] = seeding.np_random(seed)
+        self.game.simulation.streams.replace(lane, self._generators[lane])
+
+    def _seed_rest(self) -> None:
+        """Give the lanes that were never reset random seeds, as `gymnasium.Env` does when it is asked for its own."""
+        for lane in range(self.num_envs):
+            if lane not in self._generators:
+                self._seed_lane(lane, None)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Generator of each lane, as of `gymnasium.vector.SyncVectorEnv`."""
+        self._seed_rest()
+        return tuple(self._generators[lane] for lane in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Seed of each lane; a reset with None leaves it."""
+        self._seed_rest()
+        return tuple(self._seeds[lane] for lane in range(self.num_envs))
 
     def _reset_mask(self, options: dict[str, Any] | None) -> Flags:
         check_options(type(self).__name__, options, ("reset_mask",))

@@ -21,6 +21,10 @@ except ImportError as error:
     ) from error
 
 
+OF_LANES = ("np_random", "np_random_seed")
+"""Attributes of a vector environment with an entry per lane."""
+
+
 class SB3VecEnv(VecEnv):
     """Adapter of a Gymnasium vector environment in the autoreset mode SAME_STEP.
 
@@ -83,8 +87,9 @@ class SB3VecEnv(VecEnv):
         self.vector_env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the vector environment, once per lane asked for."""
-        return [getattr(self.vector_env, attr_name) for _ in self._get_indices(indices)]
+        """An attribute of the vector environment, once per lane asked for, or its part of it where lanes have parts."""
+        value = getattr(self.vector_env, attr_name)
+        return [value[lane] if attr_name in OF_LANES else value for lane in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Refused: lanes share one configuration.

@@ -151,9 +151,8 @@ def strapdown_model(
         true_velocity=trajectory.velocity[ends],
         lever_arm=np.array(receiver.lever_arm, dtype=float),
         latency_samples=round(receiver.latency * trajectory.rate),
-        measurement_covariance=np.broadcast_to(
-            tuning.measurement_covariance, (len(ends), receiver.dimension, receiver.dimension)
-        ),
+        # not broadcast: a copy of such an array has another layout, for which the kernels would be compiled again
+        measurement_covariance=np.tile(tuning.measurement_covariance, (len(ends), 1, 1)),
         filter_density=tuning.noise_density(grade),
         true_noise=np.sqrt(true_noise_density(grade, true_position_random_walk)),
         instability_sigma=grade.instability_sigma,

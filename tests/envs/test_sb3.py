@@ -77,6 +77,10 @@ def test_questions_that_sb3_asks() -> None:
     assert env.env_is_wrapped(Monitor, indices=[0, 2]) == [False] * 2
     assert env.get_attr("config") == [env.vector_env.config] * 3
     assert env.get_attr("num_envs", indices=1) == [3]
+    env.seed(7)
+    env.reset()
+    assert env.get_attr("np_random_seed") == [7, 8, 9]
+    assert env.get_attr("np_random", indices=[2]) == [env.vector_env.np_random[2]]
     assert not env.has_attr("nothing_of_the_kind")
     assert list(env.get_images()) == [None] * 3
     with pytest.raises(AttributeError, match="cannot be set"):

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 import spoofgym  # noqa: F401 - registers the environment
 from spoofgym.envs.checker import check_vector_env
-from spoofgym.envs.vector import SpooferVectorEnv
+from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
 
 ID = "spoofgym/Spoofer-v0"
 SHORT = "liu-flight:horizon=12"
@@ -67,6 +67,37 @@ def test_infos_are_those_of_gymnasiums_own_vector_environment() -> None:
                 assert a.dtype == b.dtype
             if mode == AutoresetMode.DISABLED and (one[2] | one[3]).any():
                 break
+
+
+@pytest.mark.parametrize(("kind", "name"), [(SpooferVectorEnv, ID), (DefenderVectorEnv, "spoofgym/Defender-v0")])
+def test_seeds_and_generators_are_told_as_by_gymnasium(kind: type[VectorEnv], name: str) -> None:
+    given: dict[str, Any] = {"scenario": "foi-drive:horizon=22"}
+    given |= {"detectors": "snapshot"} if name.endswith("Defender-v0") else {}
+    ours = kind(3, **given)
+    theirs = SyncVectorEnv([lambda: gym.make(name, **given)] * 3)
+    for seed in (5, None, [7, None, 3], (None, 2, None), [None] * 3, 11):
+        ours.reset(seed=seed)
+        theirs.reset(seed=seed)
+        assert ours.np_random_seed == theirs.np_random_seed
+        states = [[lane.bit_generator.state for lane in vector.np_random] for vector in (ours, theirs)]
+        assert states[0] == states[1]
+    assert ours.np_random_seed == (11, 12, 13)
+    ours.reset(seed=30, options={"reset_mask": np.array([False, True, False])})
+    assert ours.np_random_seed == (11, 31, 13)
+    ours.step(ours.action_space.sample())
+    assert ours.np_random_seed == (11, 31, 13)
+    with pytest.raises(AttributeError):
+        ours.np_random = np.random.default_rng(0)
+
+
+def test_seeds_that_were_not_given_are_told_and_give_the_same_games_again() -> None:
+    ours = SpooferVectorEnv(3, scenario=SHORT)
+    seeds = ours.np_random_seed  # before the first reset, as Gymnasium allows
+    assert len(set(seeds)) == 3
+    first, _ = ours.reset()
+    assert ours.np_random_seed == seeds
+    again, _ = SpooferVectorEnv(3, scenario=SHORT).reset(seed=list(seeds))
+    np.testing.assert_array_equal(first, again)
 
 
 def compare(one: Any, other: Any) -> bool:
@@ -159,6 +190,16 @@ class Faulty(SpooferVectorEnv):
         if fault == "mode not told":
             del self.metadata["autoreset_mode"]
 
+    @property
+    def np_random_seed(self) -> Any:
+        seeds = super().np_random_seed
+        return {"one seed told": seeds[0], "seeds of other lanes told": seeds[::-1]}.get(self.fault, seeds)
+
+    @property
+    def np_random(self) -> Any:
+        generators = super().np_random
+        return {"one generator": generators[0], "a generator missing": generators[1:]}.get(self.fault, generators)
+
     def reset(self, *, seed: Any = None, options: Any = None) -> Any:
         if self.fault == "lanes seeded alike" and isinstance(seed, int):
             seed = [seed] * self.num_envs
@@ -202,6 +243,10 @@ class Faulty(SpooferVectorEnv):
         ("outside the space", "outside its space"),
         ("reward in the wrong lane", "reward"),
         ("random", "reward"),
+        ("one seed told", "seed: a number: np_random_seed is 123, no tuple"),
+        ("seeds of other lanes told", r"np_random_seed is \(125, 124, 123\), those of the single environments are"),
+        ("one generator", "np_random is Generator.*, no tuple"),
+        ("a generator missing", "not a generator for each of 3 lanes"),
     ],
 )
 def test_checker_finds_faults(fault: str, message: str) -> None:
