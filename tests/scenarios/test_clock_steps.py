@@ -58,7 +58,7 @@ MILLISECONDS = [
 
 @pytest.mark.parametrize("clock", MILLISECONDS)
 def test_whole_milliseconds_do_not_move_the_filter(clock: Clock, tmp_path: Path, steady) -> None:
-    """The size of such a step is known. Tags are written to a nanosecond, in which a satellite moves by a micrometre."""
+    """The size of such a step is known. Tags are written to a nanosecond, in which satellites move by a micrometre."""
     scenario = tight(written(tmp_path / "log", clock))
     assert largest_difference(scenario, steady[0, 0]) < 0.01
     assert not scenario.epochs.clock_jump.any()
@@ -88,7 +88,7 @@ def test_a_step_in_an_outage_or_at_its_ends(step: tuple[int, float], tmp_path: P
 
 @pytest.mark.parametrize("size", [1e-3, 1e-4])
 def test_a_step_of_the_ranges_that_the_tags_do_not_show(size: float, tmp_path: Path, steady) -> None:
-    """The satellites are then sought at a wrong moment: range rates differ by up to 1.6 km/s, 1.6 m in a millisecond."""
+    """The satellites are then sought at a wrong moment: range rates differ by up to 1.6 km/s, or 1.6 m in 1 ms."""
     scenario = tight(written(tmp_path / "log", Clock(steps=((60, size),), in_tags=False)))
     assert largest_difference(scenario, steady[0, 0]) < 1600.0 * size + 0.1
 
