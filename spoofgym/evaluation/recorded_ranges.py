@@ -163,12 +163,12 @@ def game_onsets(fixes: Fixes, begin: float, end: float) -> Floats:
 def clock_drift(epochs: RangeEpochs) -> dict[str, float]:
     """Median drift of the receiver's clock by pseudoranges and by range rates, and the largest step between them, m/s.
 
-    Over neighbouring epochs with a fix. A receiver whose clock jumps, or whose pseudoranges and range rates hang on
-    different clocks, shows it here.
+    Over neighbouring epochs with a fix, less the steps of the clock that are found when the log is read. A receiver
+    whose pseudoranges and range rates hang on different clocks shows it here.
     """
     near = np.flatnonzero(np.diff(epochs.fix) == 1)
     first = epochs.fix[near]
-    by_code = np.diff(epochs.clock)[first] / epochs.interval
+    by_code = np.diff(epochs.clock)[first] / np.diff(epochs.time)[first]
     by_rate = 0.5 * (epochs.clock_drift[first] + epochs.clock_drift[first + 1])
     return {
         "by_pseudoranges_mps": float(np.median(by_code)),

@@ -129,6 +129,7 @@ class RecordedRanges(RecordedScenario):
             steady,
             time=ranges.time,
             intervals=np.diff(ranges.time, prepend=self.align_time),
+            clock_jump=ranges.clock_jump,
             started=ranges.started,
             noise_variance=np.where(np.tile(ranges.geometry.present, 2), sigma**2, 1.0),
         )
