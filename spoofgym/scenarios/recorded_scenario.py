@@ -29,6 +29,8 @@ SETTLING = 30.0
 LARGEST_NIS = 2.0
 """Mean NIS of a clean run per degree of freedom above which the log is doubted: a filter that believes its sigmas has
 1, and the process noise of recorded scenarios is so generous that good logs stay well below it."""
+LOST_NIS = 100.0
+"""NIS of one epoch per degree of freedom from which a filter that diverged was lost."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,7 +55,7 @@ class RecordedScenario(Scenario):
     doubts = (
         "fixes and IMU on different clocks (imu_delay_s, gnss_delay_s), an antenna far from the IMU "
         "(antenna_lever_arm_m), a wrong mounting (imu_to_body_frd), sigmas of fixes that are too small (sigma_floor), "
-        "single wrong fixes, an IMU that is worse than its grade"
+        "single wrong fixes or inertial samples, columns in other units, an IMU that is worse than its grade"
     )
     fidelities = ("strapdown",)
     matched = False
@@ -261,7 +263,11 @@ class RecordedScenario(Scenario):
             LogWarning: the mean NIS, from `SETTLING` after the alignment on, and likely reasons.
         """
         if not np.all(np.isfinite(run.position)):
-            raise ValueError(f"scenario {self.name!r}: the filter diverges on this log; likely reasons: {self.doubts}")
+            lost = int(np.argmax(~(run.nis <= LOST_NIS * run.degrees)))
+            raise ValueError(
+                f"scenario {self.name!r}: the filter diverges on this log; innovations are first too large at "
+                f"{self._place(lost)}; likely reasons: {self.doubts}"
+            )
         settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
         first = settled if settled < len(self.epoch_time) else 0
         per_degree = run.nis_per_degree(first)
@@ -270,9 +276,14 @@ class RecordedScenario(Scenario):
             warn(
                 self.log.folder,
                 f"clean innovations are {np.sqrt(per_degree):.1f} times as large as the filter believes: mean NIS "
-                f"{np.mean(run.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; the "
-                f"largest is {run.nis[worst]:.3g} at {seconds(self.epoch_time[worst])} s; likely reasons: {self.doubts}",
+                f"{np.mean(run.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; "
+                f"the largest is {run.nis[worst]:.3g} at {self._place(worst)}; likely reasons: {self.doubts}",
             )
+
+    def _place(self, epoch: int) -> str:
+        """Where an epoch is in the log, for a message."""
+        time = float(self.epoch_time[epoch])
+        return f"{seconds(time)} s{self.log.fixes.line(time)}"
 
     @cached_property
     def true_position(self) -> Floats:
