@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import position_difference
@@ -30,7 +31,8 @@ CONTRADICTION = 50.0
 """Difference that a velocity may have from the mean one before it and after it, m/s; over less than a second by as much
 more as the positions tell less."""
 FASTEST = 3.0
-"""Speed that the vehicle may have had for a short time, over its median speed."""
+"""Speed that the vehicle may have had for a short time, over its median speed in `AROUND` steps."""
+AROUND = 21
 WILD = 3
 """Fixes in a row that are left out at most: what stays away longer may be true, or the attack that is in the log."""
 
@@ -57,11 +59,11 @@ def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dic
     kept = np.flatnonzero(~no_position & ~no_fix)
     if len(kept) >= 2:
         wild = np.zeros(len(told), dtype=bool)
-        track, time = _track(table, kept), table["t_s"][kept]
-        wild[kept] = wild_fixes(time, track)
+        wild[kept] = wild_fixes(table["t_s"][kept], _track(table, kept))
+        rest = kept[~wild[kept]]
         if "vn_mps" in table:
-            velocity = np.column_stack([table["ve_mps"], table["vn_mps"], -table["vd_mps"]])[kept]
-            wild[kept] |= wild_velocities(time, track, velocity)
+            velocity = np.column_stack([table["ve_mps"], table["vn_mps"], -table["vd_mps"]])[rest]
+            wild[rest] = wild_velocities(table["t_s"][rest], _track(table, rest), velocity)
         _tell(path, wild & told, "have a position or velocity that the rows around make impossible, and are left out")
         kept = kept[~wild[kept]]
     if len(kept) < 2:
@@ -140,13 +142,13 @@ def wild_fixes(time: Floats, track: Floats) -> Flags:
         (n,).
     """
     step, duration = np.linalg.norm(np.diff(track, axis=0), axis=1), np.diff(time)
-    moved = duration > 0.0
-    speed = FASTEST * float(np.median(step[moved] / duration[moved])) if moved.any() else 0.0
+    usual = np.divide(step, duration, out=np.zeros(len(step)), where=duration > 0.0)
+    speed = FASTEST * median_filter(usual, size=AROUND, mode="mirror")
     number, wild = len(time), np.zeros(len(time), dtype=bool)
 
     def reached(one: int, other: int) -> bool:
         way = float(np.linalg.norm(track[other] - track[one]))
-        return way <= speed * (time[other] - time[one]) + FARTHEST
+        return way <= max(speed[one], speed[other - 1]) * (time[other] - time[one]) + FARTHEST
 
     handled = 0
     for place in (np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1).tolist():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.geodesy import displace, position_difference
@@ -26,9 +27,11 @@ MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""
 SETTLING = 30.0
 """Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
-LARGEST_NIS = 2.0
-"""Mean NIS of a clean run per degree of freedom above which the log is doubted: a filter that believes its sigmas has
-1, and the process noise of recorded scenarios is so generous that good logs stay well below it."""
+LARGEST_NIS = 1.5
+"""Mean NIS of a clean run per degree of freedom above which the log is doubted. A filter whose model is right has 1; the
+process noise of recorded scenarios is so generous that the logs by which it was chosen stay below 0.9."""
+CHANCE = 1e-6
+"""Probability that the mean NIS of a short log exceeds its limit although the model is right."""
 LOST_NIS = 100.0
 """NIS of one epoch per degree of freedom from which a filter that diverged was lost."""
 
@@ -270,8 +273,8 @@ class RecordedScenario(Scenario):
             )
         settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
         first = settled if settled < len(self.epoch_time) else 0
-        per_degree = run.nis_per_degree(first)
-        if per_degree > LARGEST_NIS:
+        per_degree, degrees = run.nis_per_degree(first), float(run.degrees[first:].sum())
+        if per_degree > LARGEST_NIS and per_degree * degrees > chi2.isf(CHANCE, degrees):
             worst = first + int(np.argmax(run.nis[first:]))
             warn(
                 self.log.folder,
