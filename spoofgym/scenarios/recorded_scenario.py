@@ -28,8 +28,8 @@ MAX_IMU_GAP = 0.5
 SETTLING = 30.0
 """Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
 LARGEST_NIS = 1.5
-"""Mean NIS of a clean run per degree of freedom above which the log is doubted. A filter whose model is right has 1; the
-process noise of recorded scenarios is so generous that the logs by which it was chosen stay below 0.9."""
+"""Mean NIS of a clean run per degree of freedom above which the log is doubted. A filter whose model is right has
+1; the process noise of recorded scenarios is so generous that the logs by which it was chosen stay below 0.9."""
 CHANCE = 1e-6
 """Probability that the mean NIS of a short log exceeds its limit although the model is right."""
 LOST_NIS = 100.0

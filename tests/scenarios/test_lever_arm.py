@@ -37,8 +37,8 @@ def write(folder: Path, notes: str) -> Path:
 
     def table(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         degrees = np.degrees(position[:, :2])
-        sigmas = np.full((len(every), 3), 0.03)
-        return np.column_stack([truth.time[every], degrees, position[:, 2], velocity[:, [1, 0]], -velocity[:, 2], sigmas])
+        down, sigmas = -velocity[:, 2], np.full((len(every), 3), 0.03)
+        return np.column_stack([truth.time[every], degrees, position[:, 2], velocity[:, [1, 0]], down, sigmas])
 
     error = 0.05 * generator.standard_normal((len(every), 3))
     fixes = table(displace(truth.position[every], arm + error), truth.velocity[every] + moved + 0.6 * error)

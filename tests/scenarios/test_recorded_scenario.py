@@ -1,4 +1,4 @@
-"""What a recorded game says of its log: innovations that are too large, a filter that is lost, times with all digits."""
+"""What a recorded game says of its log: innovations that are too large, a lost filter, times with all digits."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_a_filter_that_is_lost_names_the_line(tmp_path: Path) -> None:
         return values
 
     with pytest.raises(ValueError, match=r"diverges on this log; .* first too large at 63 s, line 62 of gnss\.csv"):
-        recorded(str(edit(folder, "gnss", far))).clean
+        _ = recorded(str(edit(folder, "gnss", far))).clean
 
 
 @pytest.fixture(scope="module")
@@ -113,10 +113,10 @@ def unix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         (
             "onset=1732350000",
-            "onset 1732350000 s lies outside the log: valid from 1732340006.25 s (the first fix after the alignment) to "
-            "1732340118.25 s",
+            "onset 1732350000 s lies outside the log: valid from 1732340006.25 s (the first fix after the alignment) "
+            "to 1732340118.25 s",
         ),
-        ("onset=1732340030.25,horizon=900", "horizon 900 does not fit: valid from 1 to 87 epochs after 1732340030.25 s"),
+        ("onset=1732340030.25,horizon=900", "horizon 900 does not fit: valid from 1 to 87 epochs after 1732340030.25"),
     ],
 )
 def test_unix_times_keep_their_digits(unix: Path, options: str, message: str) -> None:

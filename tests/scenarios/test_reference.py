@@ -139,4 +139,4 @@ def test_a_reference_on_another_clock_is_told(tmp_path: Path, late: float, shift
 def test_a_good_reference_is_not(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        recorded(str(write_log(tmp_path / "log"))).clean
+        _ = recorded(str(write_log(tmp_path / "log"))).clean
