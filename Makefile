@@ -8,10 +8,10 @@ BIN := .venv/bin/python
 UV  := $(shell command -v uv 2>/dev/null)
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev demo test lint typecheck benchmark clean distclean
+.PHONY: help install install-dev demo test test-portable lint typecheck benchmark clean distclean
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 demo: install ## train a PPO spoofer, evaluate it, write tables and a figure to runs/demo
 	$(BIN) -m train.spoofer --out $(DEMO)
@@ -19,6 +19,9 @@ demo: install ## train a PPO spoofer, evaluate it, write tables and a figure to 
 
 test: install-dev ## run the tests; options in ARGS, e.g. make test ARGS="-k geodesy"
 	$(BIN) -m pytest $(ARGS)
+
+test-portable: install-dev ## run the numerical tests in the arithmetic of an older processor; options in ARGS
+	$(BIN) -m tests.other_kernels $(ARGS)
 
 lint: install-dev ## check style and docstrings
 	$(BIN) -m ruff check .
@@ -32,7 +35,7 @@ benchmark: install ## measure environment steps per second
 install: .venv/.installed-train ## make .venv with what the programs need
 install-dev: .venv/.installed-dev ## the same, and the tools of a developer
 
-clean: ## remove caches and built packages (keeps .venv and runs/)
+clean: ## remove caches, compiled kernels and built packages (keeps .venv and runs/)
 	rm -rf build dist .pytest_cache .hypothesis .ruff_cache .mypy_cache
 	find . -name .venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
 

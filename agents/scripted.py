@@ -61,7 +61,7 @@ class RandomRates(Attack):
         """Draw the rates of new episodes."""
         for run in runs:
             draws = streams(run, "opponent").uniform(-1.0, 1.0, (self._offsets.shape[1] - 1, 3))
-            self._offsets[run, 1:] = np.cumsum(draws * self._rate * self._timeline.interval, axis=0)
+            self._offsets[run, 1:] = np.cumsum(draws * self._rate * self._timeline.intervals[:, None], axis=0)
 
     def offset(self, clock: Clock) -> Floats:
         """The offset of each run's epoch, (N, 3), m ENU."""

@@ -30,6 +30,7 @@ from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_ARL0, DEFAULT_WINDOW, Windowed
 from spoofgym.first_alarms import FirstAlarms
 from spoofgym.scenario import Scenario
+from spoofgym.validation import written
 
 RUNS = 5000
 FIRST_ALARMS = 200
@@ -79,7 +80,7 @@ class _Search:
     def __init__(self, detector: Detector, arl0: float, first_alarms: int) -> None:
         self.detector = detector
         self.result: Calibration | None = None
-        self._arl0 = validation.above("calibration", "arl0", arl0, 1.0)
+        self._arl0 = validation.average_run_length("calibration", "arl0", arl0)
         self._first_alarms = validation.whole("calibration", "first_alarms", first_alarms, 10)
         self._counted = FirstAlarms()
 
@@ -88,7 +89,10 @@ class _Search:
         if not statistics.any():
             raise ValueError(f"detector {self.detector.name!r}: the statistic is 0 in all clean runs")
         counted = self._counted
-        counted.add(burn_in, statistics)
+        try:
+            counted.add(burn_in, statistics)
+        except ValueError as error:
+            raise ValueError(f"detector {self.detector.name!r}: {error}") from error
         threshold = counted.threshold(self._arl0)
         alarms, at_risk = counted.at(threshold)
         if alarms >= self._first_alarms:
@@ -165,7 +169,7 @@ def measure_arl0(
         counted.add(burn_in, statistics)
         more_alarms, more_at_risk = counted.at(threshold)
         if more_at_risk == 0:
-            raise ValueError(f"threshold {threshold:g}: every clean run alarms in its burn-in")
+            raise ValueError(f"threshold {written(threshold)}: every clean run alarms in its burn-in")
         alarms, at_risk = alarms + more_alarms, at_risk + more_at_risk
     return _calibration(threshold, alarms, at_risk)
 
@@ -174,6 +178,8 @@ def measure_arl0(
 
 MOST_ARL0 = 1e7
 """Epochs: a larger one takes more clean epochs than anybody waits for."""
+LONGEST_MEMORY = 2000
+"""Epochs: thousands of runs are kept at once."""
 
 Place = tuple[object, object, str]
 _KNOWN: dict[Place, Setting] = {}
@@ -218,8 +224,13 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
     for detector in wanted:
         if detector.target_arl0 is not None and detector.target_arl0 > MOST_ARL0:
             raise ValueError(
-                f"detector {detector.name!r}: arl0 must be {MOST_ARL0:g} epochs at most to be calibrated, got "
-                f"{detector.target_arl0:g}; give a threshold"
+                f"detector {detector.name!r}: arl0 must be {written(MOST_ARL0)} epochs at most to be calibrated, got "
+                f"{written(detector.target_arl0)}; give a threshold"
+            )
+        if detector.memory > LONGEST_MEMORY:
+            raise ValueError(
+                f"detector {detector.name!r}: it must look back {LONGEST_MEMORY} epochs at most to be calibrated, it "
+                f"looks back {detector.memory}; give a threshold"
             )
     if wanted and not scenario.random:
         raise ValueError(

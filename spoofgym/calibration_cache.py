@@ -1,8 +1,7 @@
 """Results of calibration on disk, so that a program need not wait for clean runs that an earlier one has made.
 
-One JSON file per result, in ``$SPOOFGYM_CACHE``, else ``$XDG_CACHE_HOME/spoofgym``, else ``~/.cache/spoofgym``. Its
-name is a SHA-256 over everything that decides the result, the source of the simulation included: a result is used only
-by the code that made it. The folder can be deleted at any time.
+One JSON file per result, in `cache_folder`. Its name is a SHA-256 over everything that decides the result, the source
+of the simulation included: a result is used only by the code that made it. The folder can be deleted at any time.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ import numpy as np
 import scipy
 
 import spoofgym
+from spoofgym.cache_folder import folder
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.scenario import Scenario
@@ -67,18 +67,6 @@ def _source() -> str:
 
 SOURCE = _source()
 """Read when the program starts: a later edit of a file is not the code that runs."""
-
-
-def folder() -> Path | None:
-    """Where results lie; None where there is no such place."""
-    if given := os.environ.get("SPOOFGYM_CACHE"):
-        return Path(given)
-    if given := os.environ.get("XDG_CACHE_HOME"):
-        return Path(given) / "spoofgym"
-    try:
-        return Path.home() / ".cache" / "spoofgym"
-    except RuntimeError:
-        return None
 
 
 def key(*parts: str) -> str:

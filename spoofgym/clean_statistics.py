@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import math
+import sys
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.detectors.base import Detector, seen, seen_dimension
+from spoofgym.detectors.base import Detector, seen_dimension, statistic_of
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Epoch
 from spoofgym.navigation.white import WhiteInnovations
@@ -46,7 +47,7 @@ def white_statistics(
         for k in range(kept.shape[1]):
             index = np.full(runs, k - detector.memory)
             innovation = white.innovation(k - detector.memory, rng.standard_normal((runs, white.dimension)))
-            kept[:, k] = detector.update(seen(detector, Epoch(index, index.astype(np.float64), innovation)))
+            kept[:, k] = statistic_of(detector, Epoch(index, index.astype(np.float64), innovation))
         return kept[:, : detector.memory], kept[:, detector.memory :]
 
     return statistics
@@ -55,7 +56,7 @@ def white_statistics(
 class _BurnIn(Detector):
     """A detector that never alarms, and keeps the highest statistic of each run in its burn-in in ``peak``."""
 
-    threshold = math.inf
+    threshold = sys.float_info.max
 
     def __init__(self, detector: Detector) -> None:
         self._detector = detector
@@ -86,7 +87,7 @@ class _BurnIn(Detector):
 
     def update(self, epoch: Epoch) -> Floats:
         """The detector's statistic, (N,)."""
-        statistic = self._detector.update(epoch)
+        statistic = statistic_of(self._detector, epoch)
         before = (epoch.index < 0) & (epoch.index >= -self.memory)
         self.peak = np.where(before, np.maximum(self.peak, statistic), self.peak)
         return statistic

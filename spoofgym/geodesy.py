@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import pymap3d
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from spoofgym.kernels import njit
 
 SEMI_MAJOR_AXIS = 6378137.0
 """Equatorial radius a, m (WGS-84)."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Runs
 
 
@@ -23,11 +24,9 @@ class RunSlices:
         """Use up to ``threads`` threads.
 
         Raises:
-            ValueError: ``threads`` is less than 1.
+            ValueError: ``threads`` is no whole number from 1 to 1024.
         """
-        if threads < 1:
-            raise ValueError(f"threads must be 1 or more, got {threads}")
-        self.threads = threads
+        self.threads = validation.threads("slices of runs", threads)
         self._pool: ThreadPoolExecutor | None = None
         self._process: int | None = None
 
@@ -38,12 +37,15 @@ class RunSlices:
         self.__init__(**state)  # type: ignore[misc]
 
     def call(self, function: Callable[[Runs], object], runs: Runs, grain: int) -> None:
-        """Run ``function`` on slices of ``runs``.
+        """Run ``function`` on slices of ``runs``; return, or raise, when every slice has come to its end.
 
         Args:
             function: takes the slice's runs, writes its results in place.
             runs: indices, (n,).
             grain: runs below which a slice is not worth a thread.
+
+        Raises:
+            Exception: what ``function`` raised, of the first slice that did.
         """
         slices = min(self.threads, max(1, len(runs) // grain))
         if slices == 1:
@@ -53,6 +55,9 @@ class RunSlices:
             self._pool, self._process = ThreadPoolExecutor(self.threads - 1), os.getpid()
         first, *others = np.array_split(runs, slices)
         futures = [self._pool.submit(function, part) for part in others]
-        function(first)
+        try:
+            function(first)
+        finally:
+            wait(futures)  # a slice that still writes would spoil what the caller does after an error
         for future in futures:
             future.result()

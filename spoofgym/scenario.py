@@ -8,9 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import position_difference
+from spoofgym.immutable import Immutable
 from spoofgym.navigation.adaptation import Adaptation
 from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
@@ -30,13 +32,14 @@ from spoofgym.sensors.range_fix import RangeFix, draw_fix_noise
 from spoofgym.sensors.receiver import Receiver, draw_noise
 from spoofgym.streams import RunStreams
 from spoofgym.trajectory import Trajectory
+from spoofgym.validation import shown, written
 
 FIDELITIES = ("linear", "strapdown")
 ROUNDING = 1e-9
 """Times closer than this are the same, s."""
 
 
-class Scenario(ABC):
+class Scenario(Immutable, ABC):
     """What a simulation asks of a scenario.
 
     Attributes:
@@ -91,7 +94,7 @@ class Scenario(ABC):
 
     def manoeuvres(self) -> tuple[float, ...]:
         """Times within the game at which the vehicle begins to change its velocity, s."""
-        return manoeuvre_times(self.velocity(), self.timeline)
+        return manoeuvre_times(self.velocity_in_steps(), self.timeline)
 
     @abstractmethod
     def times(self, burn_in: int) -> Floats:
@@ -100,6 +103,13 @@ class Scenario(ABC):
     @abstractmethod
     def velocity(self, burn_in: int = 0) -> Floats:
         """The true velocity at epochs -burn_in..K, which a spoofer tracks, (burn_in + K + 1, 3), ENU, m/s."""
+
+    def velocity_in_steps(self) -> Floats:
+        """The true velocity at the moments of the timeline's steps, (M+1, 3), ENU, m/s.
+
+        These are epochs 0..K where no epoch is missing.
+        """
+        return self.velocity()
 
     @abstractmethod
     def track(self) -> Floats:
@@ -168,18 +178,18 @@ class Scenario(ABC):
     def draw_receiver_noise(self, runs: Runs, initial: Floats, burn_in: int, streams: RunStreams) -> Floats:
         """Receiver noise of the epochs -burn_in..K, (n, burn_in + K + 1, m), m and m/s."""
 
-    def check_fidelity(self, fidelity: str) -> None:
+    def check_fidelity(self, fidelity: object) -> None:
         """Refuse a fidelity that the scenario does not have.
 
         Raises:
             ValueError: naming the valid ones.
         """
-        if fidelity not in self.fidelities:
+        if not isinstance(fidelity, str) or fidelity not in self.fidelities:
             valid = ", ".join(self.fidelities)
-            raise ValueError(f"scenario {self.name!r} has no fidelity {fidelity!r}; valid fidelities: {valid}")
+            raise ValueError(f"scenario {self.name!r} has no fidelity {shown(fidelity)}; valid fidelities: {valid}")
 
 
-def check_game(timeline: Timeline, trajectory: Trajectory) -> None:
+def check_game(owner: str, timeline: Timeline, trajectory: Trajectory) -> None:
     """Refuse a game that does not fit its trajectory.
 
     Raises:
@@ -187,15 +197,15 @@ def check_game(timeline: Timeline, trajectory: Trajectory) -> None:
     """
     interval, horizon, onset = timeline.interval, timeline.num_epochs, timeline.start
     if horizon < 1:
-        raise ValueError(f"horizon must be 1 epoch or more, got {horizon}")
+        raise ValueError(f"{owner}: horizon must be 1 epoch or more, got {horizon}")
     first, last = 2 * interval, trajectory.time[-1] - horizon * interval
     if not first - ROUNDING <= onset <= last + ROUNDING:
         raise ValueError(
-            f"onset {onset:g} s with a horizon of {horizon} epochs does not fit the trajectory of "
-            f"{trajectory.time[-1]:g} s: valid from {first:g} to {last:g} s"
+            f"{owner}: onset {written(onset)} s with a horizon of {horizon} epochs does not fit the trajectory "
+            f"of {written(trajectory.time[-1])} s: valid from {written(first)} to {written(last)} s"
         )
     if abs(onset / interval - round(onset / interval)) > 1e-9:
-        raise ValueError(f"onset {onset:g} s is no epoch of a receiver at {1.0 / interval:g} Hz")
+        raise ValueError(f"{owner}: onset {written(onset)} s is no epoch of a receiver at {written(1.0 / interval)} Hz")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -239,11 +249,14 @@ class SimulatedScenario(Scenario):
     alert_limits: tuple[float, float] = Scenario.alert_limits
 
     def __post_init__(self) -> None:
-        check_game(self.timeline, self.trajectory)
-        if min(self.drag_off_rate) <= 0 or not self.error_scale > 0:
-            raise ValueError(
-                f"drag_off_rate and error_scale must be positive, got {self.drag_off_rate} and {self.error_scale}"
-            )
+        with validation.argument(f"scenario {self.name!r}", "receiver"):
+            self.receiver.samples_per_fix(self.trajectory.rate)
+        check_game(f"scenario {self.name!r}", self.timeline, self.trajectory)
+        owner = f"scenario {self.name!r}"
+        for rate in validation.triple(owner, "drag_off_rate", self.drag_off_rate):
+            validation.above(owner, "drag_off_rate", rate)
+        validation.above(owner, "error_scale", self.error_scale)
+        validation.above(owner, "defender_scale", self.defender_scale)
         if len(self.tuning.measurement_sigma) != self.receiver.dimension:
             raise ValueError(
                 f"the filter expects fixes of dimension {len(self.tuning.measurement_sigma)}, the receiver gives "
@@ -262,7 +275,7 @@ class SimulatedScenario(Scenario):
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, self.receiver.interval, self.horizon)
+        return Timeline.steady(self.onset, self.receiver.interval, self.horizon)
 
     @property
     def dimension(self) -> int:  # type: ignore[override]
@@ -295,7 +308,7 @@ class SimulatedScenario(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         start = self.onset - burn_in * self.receiver.interval
-        return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
+        return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
 
     def velocity(self, burn_in: int = 0) -> Floats:
         """The true velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s."""
@@ -349,7 +362,7 @@ class SimulatedScenario(Scenario):
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """The game in the linear fidelity, from epoch -burn_in on, under the filter with constant R and Q."""
         first = self._first(burn_in)
-        timeline = Timeline(
+        timeline = Timeline.steady(
             self.onset - burn_in * self.receiver.interval, self.receiver.interval, self.horizon + burn_in
         )
         dynamics = self._epochs(first, first + timeline.num_epochs + 1)
@@ -374,7 +387,7 @@ class SimulatedScenario(Scenario):
             self.tuning,
             self.true_position_random_walk,
             self.warm_start(burn_in).filter_covariance,
-            Timeline(self.times(burn_in)[0], interval, self.horizon + burn_in),
+            Timeline.steady(self.times(burn_in)[0], interval, self.horizon + burn_in),
         )
         if self.adaptation is not None:
             return AdaptiveStrapdownNavigator(model, num_runs, slices, self.adaptation, demands)

@@ -9,9 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.detectors.base import Detector, seen, seen_dimension
+from spoofgym.clean_starts import far_too_low, require_clean_starts
+from spoofgym.detectors.base import Detector, require_threshold, seen_dimension, statistic_of
+from spoofgym.navigation.divergence import diverged_error
 from spoofgym.navigation.facts import LINEAR_MODEL, RANGES
 from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
 from spoofgym.parallel import RunSlices
@@ -20,6 +23,8 @@ from spoofgym.scenario import Scenario
 from spoofgym.sensors.confounders import Confounders
 from spoofgym.streams import RunStreams
 
+OWNER = "Simulation"
+ON_DIVERGENCE = ("raise", "hold")
 MAX_REDRAWS = 100
 NO_DEMANDS = Demands()
 
@@ -52,6 +57,7 @@ class Simulation:
         threads: int = 1,
         demands: Demands = NO_DEMANDS,
         confounders: Confounders | None = None,
+        on_divergence: str = "raise",
     ) -> None:
         """Set up ``num_runs`` runs seeded ``seed + i``.
 
@@ -66,25 +72,33 @@ class Simulation:
             threads: for slices of runs.
             demands: of a defender outside, beside those of detectors and response.
             confounders: outages and multipath; None = there are none.
+            on_divergence: "raise": a run whose filter diverges ends the simulation with an error; "hold": it is held
+                at its last valid solution, and ``navigator.diverged`` tells, for a caller that ends its game.
 
         Raises:
-            ValueError: no runs, an uncalibrated detector, a fidelity that the scenario lacks, an attack outside the
-                game, or a part that needs what the scenario does not give (a linear model, a fix with velocity).
+            ValueError: no runs, an uncalibrated detector or one that alarms in every clean run, a fidelity that the
+                scenario lacks, an attack outside the game, or a part that needs what the scenario does not give.
+            TypeError: a part that is no object of its class.
         """
-        if num_runs < 1:
-            raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
+        validation.instance(OWNER, "scenario", scenario, Scenario, "a scenario, as make_scenario gives")
+        num_runs = validation.runs(OWNER, "num_runs", num_runs)
         scenario.check_fidelity(fidelity)
+        self._holds = validation.one_of(OWNER, "on_divergence", on_divergence, ON_DIVERGENCE) == "hold"
         self.scenario = scenario
         self.fidelity = fidelity
         self.num_runs = num_runs
-        self.streams = RunStreams.from_seed(seed, num_runs)
+        self.streams = RunStreams.from_seed(validation.seed(OWNER, seed), num_runs)
+        for detector in detectors:
+            validation.instance(OWNER, "detectors", detector, Detector, "detectors, as make_detector gives")
         self.detectors = {detector.name: detector for detector in detectors}
         self._bind_detectors()
         self.attack = attack
         if attack is not None:
+            validation.instance(OWNER, "attack", attack, Attack, "an attack, as make_attack gives, or None")
             self._bind_attack(attack)
         self.response = response
         if response is not None:
+            validation.instance(OWNER, "response", response, Response, "a response, as make_response gives, or None")
             scenario.facts.require(f"response {response.name!r}", response.needs)
             response.bind(num_runs)
         memory = max((detector.memory for detector in detectors), default=0)
@@ -110,6 +124,11 @@ class Simulation:
         self.clock_offset = np.zeros(num_runs)
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
+        self._require_clean_starts()
+
+    def _require_clean_starts(self) -> None:
+        if self.scenario.random:
+            require_clean_starts(self.scenario.name, list(self.detectors.values()), self._passes)
 
     def _bind_attack(self, attack: Attack) -> None:
         if attack.needs_velocity and (self.scenario.dimension != 6 or self.scenario.coupling == "tight"):
@@ -120,8 +139,10 @@ class Simulation:
             )
         if attack.needs_ranges:
             self.scenario.facts.require(f"attack {attack.name!r}", (RANGES,))
+            slots = self.scenario.satellites(np.arange(self.scenario.timeline.num_epochs + 1), 0)
+            attack.meet(np.unique(slots[slots >= 0]))
         attack.bind(self.scenario.timeline, self.num_runs)
-        attack.follow(self.scenario.velocity())
+        attack.follow(self.scenario.velocity_in_steps())
         if attack.needs_model:
             self.scenario.facts.require(f"attack {attack.name!r}", (LINEAR_MODEL,))
             attack.study(self.scenario.linear_model())
@@ -131,8 +152,7 @@ class Simulation:
             detector.bind(self.num_runs, self._seen_dimension(detector))
             self.scenario.facts.require(f"detector {detector.name!r}", detector.needs)
             detector.know(self.scenario.facts)
-            if detector.threshold is None:
-                raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
+            require_threshold(detector)
 
     def _seen_dimension(self, detector: Detector) -> int:
         return seen_dimension(detector, self.scenario.dimension, self.scenario.coupling == "tight")
@@ -182,6 +202,9 @@ class Simulation:
 
         Returns:
             Detectors of these runs alone, which have seen a clean burn-in without an alarm.
+
+        Raises:
+            RuntimeError: a run alarms in every one of its burn-ins.
         """
         bank = {name: copy.copy(detector) for name, detector in self.detectors.items()}
         for detector in bank.values():
@@ -199,7 +222,15 @@ class Simulation:
             pending = pending[self._burn_in(runs[pending], pending, bank)]
             if len(pending) == 0 or not self.scenario.random:
                 return bank
-        raise RuntimeError(f"{len(pending)} runs alarm in every clean burn-in: the thresholds are far too low")
+        raise RuntimeError(
+            f"{len(pending)} runs alarm in each of {MAX_REDRAWS} clean burn-ins: {far_too_low(self.detectors.values())}"
+        )
+
+    def _passes(self, detectors: Sequence[Detector], runs: int) -> bool:
+        """Whether any of so many clean runs, none of them one of these, gets through a burn-in without an alarm."""
+        scenario, parts = self.scenario, [copy.deepcopy(detector) for detector in detectors]
+        trial = _Trial(scenario, None, parts, None, runs, 0, fidelity=scenario.fidelities[0])
+        return not trial._burn_in(trial._all, trial._all, trial.detectors).all()
 
     def _burn_in(self, runs: Runs, places: Runs, bank: dict[str, Detector]) -> NDArray[np.bool_]:
         """One try of some runs at the burn-in; whether each alarmed in it, (n,)."""
@@ -254,8 +285,7 @@ class Simulation:
         """
         alarm = np.zeros(len(epoch.index), dtype=bool)
         for name, detector in detectors.items():
-            statistic = detector.update(seen(detector, epoch))
-            epoch.statistics[name] = statistic
+            statistic = epoch.statistics[name] = statistic_of(detector, epoch)
             assert detector.threshold is not None
             alarm |= (statistic > detector.threshold) & (epoch.index >= -detector.memory)
         return alarm
@@ -286,6 +316,9 @@ class Simulation:
             decision: of a defender outside, for these runs; None = the response's, or to use every fix where there is
                 none.
             runs: which.
+
+        Raises:
+            FilterDivergedError: the filter of a run has diverged, and the simulation does not hold it.
         """
         if decision is None:
             decision = self.decision if runs is None else self.decision.of(runs)
@@ -294,6 +327,19 @@ class Simulation:
             decision = replace(decision, use=decision.use & (available if runs is None else available[runs]))
         self.used[self._all if runs is None else runs] = decision.use
         self.navigator.resolve(decision, runs)
+        if not self._holds:
+            self.require_converged()
+
+    def require_converged(self) -> None:
+        """Refuse to go on where the filter of a run has diverged.
+
+        Raises:
+            FilterDivergedError: naming the first such run.
+        """
+        diverged = self.navigator.diverged
+        if diverged.any():
+            run = int(diverged.argmax())
+            raise diverged_error(run, float(self._times[self.navigator.index[run]]))
 
     def observe(self, offset: Floats | None = None) -> Epoch:
         """First half of the next epoch of every run: propagate, measure, form the innovation and the statistics.
@@ -304,6 +350,7 @@ class Simulation:
 
         Raises:
             RuntimeError: a run has no epoch left.
+            FilterDivergedError: the filter of a run has diverged, and the simulation does not hold it.
         """
         navigator = self.navigator
         if navigator.index.max() + 1 >= len(self._times):
@@ -317,6 +364,8 @@ class Simulation:
         self.offset, self.clock_offset = spoof.offset, spoof.clock
         navigator.propagate()
         innovation = navigator.innovate(deviation)
+        if not self._holds:
+            self.require_converged()
         available = self._available(clock.index, innovation)
         epoch = Epoch(clock.index, clock.time, innovation, available=available, view=self._view(self._all))
         self.alarm = self._test(epoch, self.detectors)
@@ -372,3 +421,10 @@ class Simulation:
             part.reset(np.arange(len(runs)))
             self.decision = self.decision.put(runs, part.decide(self._seen_by_response(epoch), self.alarm[runs]))
             self.response.take(runs, part)
+
+
+class _Trial(Simulation):
+    """A simulation whose burn-in is tried, and which is never played."""
+
+    def _require_clean_starts(self) -> None:
+        """Nothing: this is the trial."""

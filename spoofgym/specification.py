@@ -16,6 +16,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from spoofgym.validation import shown
+
 Part = TypeVar("Part")
 
 KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -48,7 +50,7 @@ class Specification:
             name, separator, rest = text.strip().partition(",")
         name = name.rstrip()
         if not name or "=" in name:
-            raise ValueError(f"specification {text!r}: expected name[:value][,key=value...]")
+            raise ValueError(f"specification {shown(text)}: expected name[:value][,key=value...]")
         value: str | None = None
         options: dict[str, str] = {}
         pieces = [piece.strip() for piece in rest.split(",")] if separator else []
@@ -57,9 +59,9 @@ class Specification:
             if position == 0 and separator == ":" and piece and not (equals and (not key or KEY.fullmatch(key))):
                 value = piece
             elif not equals or not key or not content:
-                raise ValueError(f"specification {text!r}: {piece!r} is not key=value")
+                raise ValueError(f"specification {shown(text)}: {shown(piece)} is not key=value")
             elif key in options:
-                raise ValueError(f"specification {text!r}: {key!r} is given twice")
+                raise ValueError(f"specification {shown(text)}: {shown(key)} is given twice")
             else:
                 options[key] = content
         return cls(name, value, options)
@@ -79,9 +81,9 @@ def nest(text: str) -> str:
     return text.translate(NESTED)
 
 
-def unnest(text: str) -> str:
-    """The specification that `nest` wrote."""
-    return text.translate(UNNESTED)
+def unnest(text: Any) -> Any:
+    """The specification that `nest` wrote; what is no text stays as it is, and is refused where it is built."""
+    return text.translate(UNNESTED) if isinstance(text, str) else text
 
 
 def spell(name: str, value: object = None, **options: object) -> str:
@@ -119,32 +121,39 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
     """
     if not isinstance(text, str):
         valid = ", ".join(sorted(registry))
-        raise TypeError(f"{kind} must be a specification ({valid}) or an object of its class, got {text!r}")
+        raise TypeError(f"{kind} must be a specification ({valid}) or an object of its class, got {shown(text)}")
     specification = Specification.parse(text)
     if specification.name not in registry:
-        raise ValueError(f"unknown {kind} {specification.name!r}; valid names: {', '.join(sorted(registry))}")
+        raise ValueError(f"unknown {kind} {shown(specification.name)}; valid names: {', '.join(sorted(registry))}")
     factory = registry[specification.name]
     parameters = inspect.signature(factory).parameters
     hints = typing.get_type_hints(factory.__init__ if inspect.isclass(factory) else factory)
     arguments = dict(specification.options)
     if specification.value is not None:
         if not parameters:
-            raise ValueError(f"{kind} {specification.name!r} takes no value, got {specification.value!r}")
+            raise ValueError(f"{kind} {specification.name!r} takes no value, got {shown(specification.value)}")
         first = next(iter(parameters))
         if first in arguments:
-            raise ValueError(f"{kind} {text!r}: {first!r} is given twice")
+            raise ValueError(f"{kind} {shown(text)}: {first!r} is given twice")
         arguments[first] = specification.value
     unknown = [key for key in arguments if key not in parameters]
     if unknown:
         valid = ", ".join(parameters) or "none"
         nested = specification.value is not None and ":" in specification.value
         hint = "; for an option of the part within, write '/' in place of ','" if nested else ""
-        raise ValueError(f"{kind} {specification.name!r} has no option {unknown[0]!r}; valid options: {valid}{hint}")
+        options = f"valid options: {valid}{hint}"
+        raise ValueError(f"{kind} {specification.name!r} has no option {shown(unknown[0])}; {options}")
     missing = [p.name for p in parameters.values() if p.default is inspect.Parameter.empty and p.name not in arguments]
     if missing:
         example = f"{specification.name}:{missing[0]}=..."
         raise ValueError(f"{kind} {specification.name!r} needs {missing[0]!r}, e.g. {example}")
-    return factory(**{key: _convert(text, key, value, hints.get(key, str)) for key, value in arguments.items()})
+    converted = {key: _convert(text, key, value, hints.get(key, str)) for key, value in arguments.items()}
+    try:
+        return factory(**converted)
+    except ValueError as error:
+        if specification.name in str(error):
+            raise
+        raise ValueError(f"{kind} {specification.name!r}: {error}") from error
 
 
 def _convert(text: str, key: str, value: str, annotation: Any) -> Any:
@@ -152,7 +161,7 @@ def _convert(text: str, key: str, value: str, annotation: Any) -> Any:
     choices = typing.get_args(annotation) if union else (annotation,)
     if bool in choices:
         if value.lower() not in ("true", "false"):
-            raise ValueError(f"{text!r}: {key} must be true or false, got {value!r}")
+            raise ValueError(f"{shown(text)}: {key} must be true or false, got {shown(value)}")
         return value.lower() == "true"
     for kind in (int, float):
         if kind in choices:
@@ -163,4 +172,4 @@ def _convert(text: str, key: str, value: str, annotation: Any) -> Any:
     if str in choices:
         return value
     wanted = " or ".join(choice.__name__ for choice in choices if choice is not type(None))
-    raise ValueError(f"{text!r}: {key} must be {wanted}, got {value!r}")
+    raise ValueError(f"{shown(text)}: {key} must be {wanted}, got {shown(value)}")

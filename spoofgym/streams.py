@@ -12,6 +12,8 @@ from typing import cast
 
 import numpy as np
 
+from spoofgym import validation
+
 PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders")
 
 
@@ -20,33 +22,33 @@ class RunStreams:
 
     A child depends on its parent's seed sequence and its purpose alone, never on the order in which children are asked
     for. It is the child that ``spawn`` would give at the purpose's place, so nobody else spawns from these parents.
+
+    Seed sequences are kept beside the generators, because NumPy before 2.0 leaves them out of copies of a generator.
     """
 
     def __init__(self, parents: Sequence[np.random.Generator]) -> None:
-        """Keep the runs' own generators, in order."""
-        self._parents = list(parents)
-        self._children: dict[tuple[int, str], np.random.Generator] = {}
+        """Take the seed sequences of the runs' own generators, in order."""
+        self._sequences = [_sequence(parent) for parent in parents]
+        self._children: dict[tuple[int, str], tuple[np.random.SeedSequence, np.random.Generator]] = {}
 
     @classmethod
     def from_seed(cls, seed: int | None, num_runs: int) -> RunStreams:
         """Streams of runs seeded ``seed + i``, as Gymnasium seeds the lanes of a vector environment.
 
         Raises:
-            ValueError: the seed is negative, or there is no run.
+            ValueError: the seed is negative or no integer, or there is no run, or too many.
         """
-        if seed is not None and seed < 0:
-            raise ValueError(f"seed must be a non-negative integer or None, got {seed}")
-        if num_runs < 1:
-            raise ValueError(f"num_runs must be 1 or more, got {num_runs}")
+        seed = validation.seed("random streams", seed)
+        num_runs = validation.runs("random streams", "num_runs", num_runs)
         seeds = [None] * num_runs if seed is None else [seed + i for i in range(num_runs)]
         return cls([np.random.Generator(np.random.PCG64(np.random.SeedSequence(s))) for s in seeds])
 
     def __len__(self) -> int:
-        return len(self._parents)
+        return len(self._sequences)
 
     def replace(self, run: int, parent: np.random.Generator) -> None:
         """Give a run a new generator; its children start anew."""
-        self._parents[run] = parent
+        self._sequences[run] = _sequence(parent)
         for purpose in PURPOSES:
             self._children.pop((run, purpose), None)
 
@@ -56,13 +58,32 @@ class RunStreams:
         Raises:
             ValueError: unknown purpose.
         """
+        return self._child(run, purpose)[1]
+
+    def spawn(self, run: int, purpose: str) -> np.random.Generator:
+        """A new generator below the one of a run for a purpose, another one at each call.
+
+        Raises:
+            ValueError: unknown purpose.
+        """
+        return _generator(self._child(run, purpose)[0].spawn(1)[0])
+
+    def _child(self, run: int, purpose: str) -> tuple[np.random.SeedSequence, np.random.Generator]:
         child = self._children.get((run, purpose))
         if child is None:
             if purpose not in PURPOSES:
                 valid = ", ".join(PURPOSES)
                 raise ValueError(f"unknown purpose {purpose!r} of a random stream; valid purposes: {valid}")
-            sequence = cast(np.random.SeedSequence, self._parents[run].bit_generator.seed_seq)
-            key = (*sequence.spawn_key, PURPOSES.index(purpose))
-            child = np.random.Generator(np.random.SFC64(np.random.SeedSequence(sequence.entropy, spawn_key=key)))
-            self._children[run, purpose] = child
+            parent = self._sequences[run]
+            key = (*parent.spawn_key, PURPOSES.index(purpose))
+            sequence = np.random.SeedSequence(parent.entropy, spawn_key=key)
+            child = self._children[run, purpose] = sequence, _generator(sequence)
         return child
+
+
+def _sequence(generator: np.random.Generator) -> np.random.SeedSequence:
+    return cast(np.random.SeedSequence, generator.bit_generator.seed_seq)
+
+
+def _generator(sequence: np.random.SeedSequence) -> np.random.Generator:
+    return np.random.Generator(np.random.SFC64(sequence))

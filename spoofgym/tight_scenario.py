@@ -92,14 +92,14 @@ class TightScenario(Scenario):
     offers = (INERTIAL_SOLUTION, RANGES)
 
     def __post_init__(self) -> None:
-        check_game(self.timeline, self.trajectory)
+        check_game(f"scenario {self.name!r}", self.timeline, self.trajectory)
         if self.observable not in OBSERVABLES:
             raise ValueError(f"observable must be one of {', '.join(OBSERVABLES)}, got {self.observable!r}")
 
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, 1.0 / self.rate, self.horizon)
+        return Timeline.steady(self.onset, 1.0 / self.rate, self.horizon)
 
     @property
     def dimension(self) -> int:  # type: ignore[override]
@@ -124,7 +124,7 @@ class TightScenario(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         interval = self.timeline.interval
-        return Timeline(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
+        return Timeline.steady(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
 
     def _samples(self, times: Floats) -> Runs:
         return np.asarray(np.round(times * self.trajectory.rate), dtype=np.int64)
@@ -212,7 +212,7 @@ class TightScenario(Scenario):
             self.tuning,
             self.tuning.position_random_walk,
             model.prior_covariance,
-            Timeline(times[0], self.timeline.interval, self.horizon + burn_in),
+            Timeline.steady(times[0], self.timeline.interval, self.horizon + burn_in),
         )
         first = self._first(burn_in)
         satellites = self.geometry.position[first : first + len(times)]

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from spoofgym.geodesy import normal_gravity
+from spoofgym.kernels import njit
 from spoofgym.navigation.mechanization import advance_position, attitude_matrix, invert_mechanization
 
 MAX_LATITUDE = math.radians(89.0)

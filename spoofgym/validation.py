@@ -1,55 +1,135 @@
-"""Checks of arguments, with one form of message: who, which argument, what is valid, what came."""
+"""Checks of arguments, with one form of message: who, which argument, what is valid, what came.
+
+Every number has a least and a largest value. Far beyond anything that navigates, they keep squares and sums finite and
+memories in bounds.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from spoofgym.arrays import Floats
 
+LARGEST = 1e9
+"""Of a quantity, in its unit: metres, metres per second, seconds, sigma."""
+SMALLEST = 1e-9
+"""Of a quantity that must be greater than zero, in its unit."""
+LATEST = 1e12
+"""Of a time on a clock, s; Unix times are 1.7e9."""
+LONGEST = 10_000
+"""Of a memory of past epochs; half an hour at 5 Hz."""
+LONGEST_TABLE = 1_000
+"""Of a memory whose epochs each take a table of the scenario's length, or a filter's covariance."""
+MOST_RUNS = 1_000_000
+LONGEST_ARL0 = 1e15
+LEAST_PROBABILITY = 1e-300
+MOST_LETTERS = 100
+"""Of a value in a message."""
 
-def finite(owner: str, name: str, value: Any) -> float:
-    """The value as a finite number.
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def finite(owner: str, name: str, value: Any, largest: float = LARGEST) -> float:
+    """The value as a finite number of at most ``largest``, of either sign.
 
     Raises:
-        ValueError: it is not a finite number.
+        ValueError: it is not.
     """
-    return _real(owner, name, value, "a finite number", -math.inf)
+    return _within(owner, name, "a finite number", _real(owner, name, value, "a finite number"), -largest, largest)
 
 
-def non_negative(owner: str, name: str, value: Any) -> float:
+def time(owner: str, name: str, value: Any) -> float:
+    """The value as a time on a clock, s.
+
+    Raises:
+        ValueError: it is not a finite number of at most `LATEST`.
+    """
+    return finite(owner, name, value, LATEST)
+
+
+def non_negative(owner: str, name: str, value: Any, largest: float = LARGEST) -> float:
     """The value as a finite number of zero or more.
 
     Raises:
-        ValueError: it is negative or not a finite number.
+        ValueError: it is negative, not a finite number, or greater than ``largest``.
     """
-    number = _real(owner, name, value, "a finite number, 0 or more", -math.inf)
+    wanted = "a finite number, 0 or more"
+    number = _real(owner, name, value, wanted)
     if number < 0.0:
-        raise ValueError(_message(owner, name, "a finite number, 0 or more", value))
-    return number
+        raise ValueError(_message(owner, name, wanted, value))
+    return _within(owner, name, wanted, number, 0.0, largest)
+
+
+def zero_or_above(owner: str, name: str, value: Any, largest: float = LARGEST) -> float:
+    """The value as zero, or as a finite number of `SMALLEST` or more: one that divides where it is not zero.
+
+    Raises:
+        ValueError: it is not.
+    """
+    number = non_negative(owner, name, value, largest)
+    return above(owner, name, number, largest=largest) if number else 0.0
 
 
 def non_negatives(owner: str, name: str, values: Any) -> Floats:
-    """The values, of any shape, as numbers of zero or more.
+    """The values, of any shape, as finite numbers of zero or more.
 
     Raises:
-        ValueError: one is negative or no number.
+        ValueError: one is negative or no finite number.
     """
-    numbers = np.asarray(values, dtype=np.float64)
-    if not np.all(numbers >= 0.0):
-        raise ValueError(_message(owner, name, "numbers, 0 or more", float(np.min(numbers))))
-    return numbers
+    array = floats(owner, name, values)
+    if not np.all(array >= 0.0):
+        raise ValueError(_message(owner, name, "numbers, 0 or more", float(np.min(array))))
+    return array
 
 
-def above(owner: str, name: str, value: Any, bound: float = 0.0) -> float:
-    """The value as a finite number greater than ``bound``.
+def above(owner: str, name: str, value: Any, bound: float = 0.0, largest: float = LARGEST) -> float:
+    """The value as a finite number greater than ``bound``, by `SMALLEST` at least.
 
     Raises:
-        ValueError: it is ``bound`` or less, or not a finite number.
+        ValueError: it is ``bound`` or less, not a finite number, or greater than ``largest``.
     """
-    return _real(owner, name, value, f"a finite number greater than {bound:g}", bound)
+    wanted = f"a finite number greater than {_bound(bound)}"
+    number = _real(owner, name, value, wanted)
+    if number <= bound:
+        raise ValueError(_message(owner, name, wanted, value))
+    return _within(owner, name, wanted, number, bound + SMALLEST, largest)
+
+
+def between(owner: str, name: str, value: Any, least: float, largest: float) -> float:
+    """The value as a number from ``least`` to ``largest``.
+
+    Raises:
+        ValueError: it is not.
+    """
+    wanted = f"a number from {_bound(least)} to {_bound(largest)}"
+    number = _real(owner, name, value, wanted)
+    if not least <= number <= largest:
+        raise ValueError(_message(owner, name, wanted, value))
+    return number
+
+
+def hour(owner: str, name: str, value: Any) -> float:
+    """The value as an hour of a day, from 0 to 24.
+
+    Raises:
+        ValueError: it is not.
+    """
+    return between(owner, name, value, 0.0, 24.0)
+
+
+def average_run_length(owner: str, name: str, value: Any) -> float:
+    """The value as an ARL0, greater than 1 epoch.
+
+    Raises:
+        ValueError: it is not.
+    """
+    return above(owner, name, value, 1.0, LONGEST_ARL0)
 
 
 def probability(owner: str, name: str, value: Any) -> float:
@@ -58,10 +138,11 @@ def probability(owner: str, name: str, value: Any) -> float:
     Raises:
         ValueError: it is not.
     """
-    number = _real(owner, name, value, "greater than 0 and less than 1", 0.0)
-    if number >= 1.0:
-        raise ValueError(_message(owner, name, "greater than 0 and less than 1", value))
-    return number
+    wanted = "greater than 0 and less than 1"
+    number = _real(owner, name, value, wanted)
+    if not 0.0 < number < 1.0:
+        raise ValueError(_message(owner, name, wanted, value))
+    return _within(owner, name, wanted, number, LEAST_PROBABILITY, 1.0)
 
 
 def share(owner: str, name: str, value: Any) -> float:
@@ -70,22 +151,132 @@ def share(owner: str, name: str, value: Any) -> float:
     Raises:
         ValueError: it is not.
     """
-    number = _real(owner, name, value, "a share from 0 to 1", -math.inf)
+    number = _real(owner, name, value, "a share from 0 to 1")
     if not 0.0 <= number <= 1.0:
         raise ValueError(_message(owner, name, "a share from 0 to 1", value))
     return number
 
 
-def whole(owner: str, name: str, value: Any, least: int) -> int:
-    """The value as a whole number of ``least`` or more.
+def whole(owner: str, name: str, value: Any, least: int, most: int = int(LARGEST)) -> int:
+    """The value as a whole number from ``least`` to ``most``.
 
     Raises:
-        ValueError: it is less, or not a whole number.
+        ValueError: it is less or more, or not a whole number.
     """
-    number = _real(owner, name, value, f"a whole number, {least} or more", -math.inf)
+    wanted = f"a whole number, {least} or more"
+    number = _real(owner, name, value, wanted)
     if number != int(number) or number < least:
-        raise ValueError(_message(owner, name, f"a whole number, {least} or more", value))
+        raise ValueError(_message(owner, name, wanted, value))
+    if number > most:
+        raise ValueError(_message(owner, name, f"{wanted}, {most} at most", value))
     return int(number)
+
+
+def epochs(owner: str, name: str, value: Any, least: int = 1, most: int = LONGEST) -> int:
+    """The value as the length of a memory of past epochs.
+
+    Raises:
+        ValueError: it is not a whole number from ``least`` to ``most``.
+    """
+    return whole(owner, name, value, least, most)
+
+
+def runs(owner: str, name: str, value: Any) -> int:
+    """The value as a number of runs, at least one.
+
+    Raises:
+        ValueError: it is not a whole number from 1 to `MOST_RUNS`.
+    """
+    return whole(owner, name, value, 1, MOST_RUNS)
+
+
+def threads(owner: str, value: Any) -> int:
+    """The value as a number of threads.
+
+    Raises:
+        ValueError: it is not a whole number from 1 to 1024.
+    """
+    return whole(owner, "threads", value, 1, 1024)
+
+
+def seed(owner: str, value: Any, name: str = "seed") -> int | None:
+    """The value as a seed: a whole number of any size, 0 or more, or None for fresh entropy.
+
+    Raises:
+        ValueError: it is negative, or no integer.
+    """
+    if value is None:
+        return None
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        number = int(value)
+        if number >= 0:
+            return number
+    raise ValueError(_message(owner, name, "a non-negative integer or None", value))
+
+
+# --- other values -----------------------------------------------------------------------------------------------------
+
+
+def floats(owner: str, name: str, values: Any) -> Floats:
+    """The values, of any shape, as finite numbers.
+
+    Raises:
+        ValueError: one is no finite number.
+    """
+    array = real_array(values)
+    if array is None or not np.all(np.isfinite(array)):
+        raise ValueError(_message(owner, name, "finite numbers", values))
+    return array.astype(np.float64, copy=False)
+
+
+def real_array(values: Any) -> np.ndarray | None:
+    """The values as an array of real numbers as they are; None where they are no such array.
+
+    Text, truth values, complex numbers and objects are no real numbers.
+    """
+    if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+        return values
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError, OverflowError, RuntimeError):
+        return None
+    return array if array.dtype.kind in "fiu" else None
+
+
+def triple(owner: str, name: str, values: Any, axes: str = "E, N, U") -> tuple[float, float, float]:
+    """The values as three finite numbers, one for each axis.
+
+    Raises:
+        ValueError: they are not.
+    """
+    wanted = f"three numbers ({axes})"
+    array = real_array(values)
+    if array is None or array.shape != (3,):
+        raise ValueError(_message(owner, name, wanted, values))
+    first, second, third = (finite(owner, name, value) for value in array.tolist())
+    return first, second, third
+
+
+def boolean(owner: str, name: str, value: Any) -> bool:
+    """The value as True or False.
+
+    Raises:
+        ValueError: it is something else, though it be 0 or 1.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(_message(owner, name, "True or False", value))
+    return bool(value)
+
+
+def text(owner: str, name: str, value: Any) -> str:
+    """The value, which is a text of at least one letter.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if not isinstance(value, str) or not value:
+        raise ValueError(_message(owner, name, "a text that is not empty", value))
+    return value
 
 
 def one_of(owner: str, name: str, value: Any, valid: tuple[str, ...]) -> str:
@@ -94,9 +285,19 @@ def one_of(owner: str, name: str, value: Any, valid: tuple[str, ...]) -> str:
     Raises:
         ValueError: it is not.
     """
-    if value not in valid:
+    if not isinstance(value, str) or value not in valid:
         raise ValueError(_message(owner, name, f"one of {', '.join(valid)}", value))
     return str(value)
+
+
+def instance(owner: str, name: str, value: Any, kind: type, wanted: str) -> None:
+    """Refuse a value that is no object of a class.
+
+    Raises:
+        TypeError: it is not; the message says what is ``wanted``.
+    """
+    if not isinstance(value, kind):
+        raise TypeError(_message(owner, name, wanted, value))
 
 
 def at_most_one(owner: str, **options: object) -> None:
@@ -110,15 +311,64 @@ def at_most_one(owner: str, **options: object) -> None:
         raise ValueError(f"{owner}: give at most one of {', '.join(options)}; got {' and '.join(given)}")
 
 
-def _real(owner: str, name: str, value: Any, wanted: str, bound: float) -> float:
+@contextmanager
+def argument(owner: str, name: str) -> Iterator[None]:
+    """Put owner and argument before the message of what the argument's parts refuse.
+
+    Raises:
+        ValueError: what was refused.
+        TypeError: what was refused.
+    """
     try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if isinstance(value, (str, bool)) or not math.isfinite(number) or number <= bound:
-        raise ValueError(_message(owner, name, wanted, value))
+        yield
+    except (ValueError, TypeError) as error:
+        kind = ValueError if isinstance(error, ValueError) else TypeError
+        raise kind(f"{owner}: {name}: {error}") from error
+
+
+# --- messages ---------------------------------------------------------------------------------------------------------
+
+
+def written(number: float) -> str:
+    """A number for a message, with all its digits but those of binary rounding: 1732876800.25, 0.3, 120."""
+    return f"{number:.15g}"
+
+
+def shown(value: object) -> str:
+    """A value for a message, cut where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of thousands of digits has no text, nor has a list within itself
+        text = f"a {type(value).__name__} too long to show"
+    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}..."
+
+
+def _real(owner: str, name: str, value: Any, wanted: str) -> float:
+    given = value
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    number = math.nan
+    if not isinstance(value, str | bytes | bool | np.bool_ | np.ndarray | np.complexfloating):
+        try:
+            number = float(value)
+        except (TypeError, ValueError, OverflowError):
+            number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(_message(owner, name, wanted, given))
     return number
 
 
+def _within(owner: str, name: str, wanted: str, number: float, least: float, largest: float) -> float:
+    """The number, if it lies within the limits that every number has."""
+    if not least <= number <= largest:
+        raise ValueError(_message(owner, name, f"{wanted}, from {_bound(least)} to {_bound(largest)}", number))
+    return number
+
+
+def _bound(number: float) -> str:
+    """A limit: round ones as a power of ten."""
+    return f"{number:g}" if float(f"{number:g}") == number else written(number)
+
+
 def _message(owner: str, name: str, wanted: str, value: object) -> str:
-    return f"{owner}: {name} must be {wanted}, got {value!r}"
+    return f"{owner}: {name} must be {wanted}, got {shown(value)}"

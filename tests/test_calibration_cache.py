@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -84,15 +83,6 @@ def test_a_write_that_fails_leaves_nothing(place, monkeypatch):
     monkeypatch.setattr(Path, "replace", full)
     calibration_cache.store(NAME, SETTING, "")
     assert list(place.iterdir()) == []
-
-
-def test_where_results_lie(monkeypatch):
-    assert calibration_cache.folder() == Path(os.environ["SPOOFGYM_CACHE"])
-    monkeypatch.setenv("SPOOFGYM_CACHE", "")
-    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
-    assert calibration_cache.folder() == Path("/somewhere/spoofgym")
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    assert calibration_cache.folder() == Path.home() / ".cache" / "spoofgym"
 
 
 def test_the_next_program_reads_what_this_one_found(place, monkeypatch):

@@ -1,9 +1,19 @@
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
 from spoofgym.streams import PURPOSES, RunStreams
+
+
+class Forgetful(np.random.Generator):
+    """A generator whose copies have lost its seed sequence."""
+
+    def __reduce__(self):
+        return Forgetful, (np.random.PCG64(),)
 
 
 def draw(streams, run, purpose, size=8):
@@ -56,6 +66,26 @@ def test_a_gymnasium_generator_gives_the_streams_of_its_seed():
     np.testing.assert_array_equal(
         draw(RunStreams([generator]), 0, "initial"), draw(RunStreams.from_seed(11, 1), 0, "initial")
     )
+
+
+def test_spawned_generators_are_numpys_own_and_other_ones_at_each_call():
+    streams = RunStreams.from_seed(5, 2)
+    expected = np.random.Generator(np.random.SFC64(np.random.SeedSequence(6, spawn_key=(1,)))).spawn(2)
+    for generator in expected:
+        np.testing.assert_array_equal(streams.spawn(1, "imu").standard_normal(8), generator.standard_normal(8))
+
+
+@pytest.mark.parametrize("make_copy", [copy.deepcopy, lambda streams: pickle.loads(pickle.dumps(streams))])
+def test_a_copy_goes_on_and_spawns_as_the_original(make_copy):
+    """Whatever NumPy copies of a generator: here it forgets the seed sequence, as NumPy did before 2.0."""
+    generator = Forgetful(np.random.PCG64(np.random.SeedSequence(5)))
+    streams = RunStreams([generator])
+    draw(streams, 0, "imu", 3)
+    streams.spawn(0, "imu")
+    other = make_copy(streams)
+    for purpose in PURPOSES:
+        np.testing.assert_array_equal(draw(other, 0, purpose), draw(streams, 0, purpose))
+    np.testing.assert_array_equal(other.spawn(0, "imu").standard_normal(8), streams.spawn(0, "imu").standard_normal(8))
 
 
 def test_replace_starts_the_children_of_one_run_anew():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 
+from spoofgym import validation
 from spoofgym.attacks.azimuth import FOI_ATTACKS, Azimuth
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.circle import Circle
@@ -31,19 +32,25 @@ from spoofgym.attacks.tracking_error import SIGMA, TrackingError
 from spoofgym.specification import Specification, build, unnest
 
 
+def _inside(owner: str, attack: str) -> Attack:
+    """The attack within another one, spelled with ``/`` in place of its commas."""
+    with validation.argument(owner, "attack"):
+        return make_attack(unnest(attack))
+
+
 def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> TrackingError:
     """The tracking error around an attack that is spelled with ``/`` in place of its commas."""
-    return TrackingError(make_attack(unnest(attack)), sigma, time, axis)
+    return TrackingError(_inside("tracking-error", attack), sigma, time, axis)
 
 
 def _position_only(attack: str) -> PositionOnly:
     """The attack spelled with ``/`` in place of its commas, with a velocity that stays true."""
-    return PositionOnly(make_attack(unnest(attack)))
+    return PositionOnly(_inside("position-only", attack))
 
 
 def _partial(attack: str, satellites: int | None = None, numbers: str | None = None) -> Partial:
     """The attack spelled with ``/`` in place of its commas, on a part of the satellites."""
-    return Partial(make_attack(unnest(attack)), satellites, numbers)
+    return Partial(_inside("partial", attack), satellites, numbers)
 
 
 ATTACKS: dict[str, Callable[..., Attack]] = {
@@ -99,7 +106,8 @@ def opponents(attacks: str | Attack | Sequence[str | Attack], clean: float) -> A
         return copy.deepcopy(attacks)
     if isinstance(attacks, str) and Specification.parse(attacks).name in POPULATIONS:
         if "clean" in Specification.parse(attacks).options:
-            raise ValueError(f"the share of clean games is given by clean={clean:g}, not in {attacks!r}")
+            given = validation.written(clean)
+            raise ValueError(f"the share of clean games is given by clean={given}, not in {attacks!r}")
         pool = make_attack(f"{attacks},clean={float(clean)!r}")
         assert isinstance(pool, AttackPool)
         return pool

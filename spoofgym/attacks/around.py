@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Clock, Timeline
@@ -13,10 +14,14 @@ class AroundAttack(Attack):
     """An attack that does what the one inside does, but for what a subclass changes.
 
     Attributes:
+        kind: the registered name.
         attack: the attack inside.
     """
 
+    kind: str
+
     def __init__(self, attack: Attack) -> None:
+        validation.instance(self.kind, "attack", attack, Attack, "an attack")
         self.attack = attack
         self.onset = attack.onset
         self.needs_model = attack.needs_model
@@ -33,12 +38,16 @@ class AroundAttack(Attack):
         super().bind(timeline, num_runs)
 
     def follow(self, velocity: Floats) -> None:
-        """Tell the attack inside the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        """Tell the attack inside the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
         self.attack.follow(velocity)
 
     def study(self, model: LinearModel) -> None:
         """Show the attack inside the victim's linear model."""
         self.attack.study(model)
+
+    def meet(self, satellites: Runs) -> None:
+        """Tell the attack inside the numbers of the satellites in the game."""
+        self.attack.meet(satellites)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Start new episodes of the attack inside."""

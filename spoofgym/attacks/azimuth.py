@@ -12,6 +12,7 @@ from spoofgym.attacks.base import Attack
 from spoofgym.attacks.fixed_offsets import FixedOffsets
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
+from spoofgym.validation import written
 
 DECAY = 45.0
 """Length of the decay, s, where the attack lasts so long. The report's table leaves it out; with it the parallel run of
@@ -38,9 +39,10 @@ class Azimuth(FixedOffsets):
     """The receiver is led along the true speed with a false azimuth (FOI-R-5687, chapter 4).
 
     The spoofed position advances by the turned velocity of the coming epoch, p(i+1) = p(i) + v(i+1) Δt, from the true
-    position at the onset. This rectangle rule is the report's: in a turn of the vehicle it adds half an interval's
-    change of velocity to the offset, 10 m in 60 degrees at 20 m/s, and the report's figures have that in them. Its
-    horizontal speed is scaled by the vertical velocity, which is left out. The offset is zero again after the end.
+    position at the onset; where epochs are missing it goes on in steps of the usual interval. This rectangle rule is
+    the report's: in a turn of the vehicle it adds half an interval's change of velocity to the offset, 10 m in 60
+    degrees at 20 m/s, and the report's figures have that in them. Its horizontal speed is scaled by the vertical
+    velocity, which is left out. The offset is zero again after the end.
 
     Args:
         azimuth: largest error, degrees clockwise.
@@ -64,10 +66,10 @@ class Azimuth(FixedOffsets):
         self.azimuth = validation.above("azimuth", "azimuth", azimuth)
         self.growth = validation.above("azimuth", "growth", growth)
         self.decay = validation.above("azimuth", "decay", decay)
-        self.onset = None if onset is None else validation.finite("azimuth", "onset", onset)
-        self.end = None if end is None else validation.finite("azimuth", "end", end)
+        self.onset = None if onset is None else validation.time("azimuth", "onset", onset)
+        self.end = None if end is None else validation.time("azimuth", "end", end)
         if self.end is not None and self.onset is not None and self.end <= self.onset:
-            raise ValueError(f"azimuth: end must be later than the onset at {self.onset:g} s, got {end!r}")
+            raise ValueError(f"azimuth: end must be later than the onset at {written(self.onset)} s, got {end!r}")
 
     @property
     def name(self) -> str:
@@ -89,24 +91,25 @@ class Azimuth(FixedOffsets):
         """
         super().bind(timeline, num_runs)
         if self.end is not None and self.end <= self._onset:
-            raise ValueError(f"azimuth: end must be later than the onset at {self._onset:g} s, got {self.end!r}")
+            raise ValueError(f"azimuth: end must be later than the onset at {written(self._onset)} s, got {self.end!r}")
         self._end = timeline.end if self.end is None else self.end
 
     def follow(self, velocity: Floats) -> None:
-        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
-        times, interval, end = self._timeline.times, self._timeline.interval, self._end
-        since = self._since()
-        decay = max(min(self.decay, end - self._onset - self.growth), interval)
+        """Take the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
+        end = self._end
+        decay = max(min(self.decay, end - self._onset - self.growth), self._timeline.interval)
+        moments, lengths, epochs = self._timeline.steps
+        since = moments - self._onset
         error = -azimuth_error(np.maximum(since, 0.0), np.radians(self.azimuth), self.growth, decay)
         cosine, sine = np.cos(error), np.sin(error)
         east, north = velocity[:, 0], velocity[:, 1]
         turned = np.stack([cosine * east - sine * north, sine * east + cosine * north], axis=1)
-        inside = (since > 1e-9) & (times <= end + 1e-9)
+        inside = (since > 1e-9) & (moments <= end + 1e-9)
         travelled = 0.5 * (velocity[1:, :2] + velocity[:-1, :2])
-        steps = np.where(inside[1:, None], (turned[1:] - travelled) * interval, 0.0)
+        moved = np.where(inside[1:, None], (turned[1:] - travelled) * lengths[:, None], 0.0)
         self._offsets[:] = 0.0
-        self._offsets[1:, :2] = np.cumsum(steps, axis=0)
-        self._offsets[~inside] = 0.0
+        self._offsets[1:, :2] = np.cumsum(moved, axis=0)[epochs[1:] - 1]
+        self._offsets[~inside[epochs]] = 0.0
 
     def active(self, clock: Clock) -> Flags:
         """Whether the receiver follows the spoofer, (N,): to the end of the attack."""
@@ -137,8 +140,7 @@ class FoiScenario(Azimuth):
     """
 
     def __init__(self, number: int) -> None:
-        if number not in FOI_SCENARIOS:
-            raise ValueError(f"foi: number must be from 1 to {len(FOI_SCENARIOS)}, got {number!r}")
+        number = validation.whole("foi", "number", number, 1, len(FOI_SCENARIOS))
         onset, end, growth, azimuth = FOI_SCENARIOS[number]
         super().__init__(azimuth, growth, onset, end)
         self.number = number

@@ -10,6 +10,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.streams import RunStreams
+from spoofgym.validation import written
 
 
 class Attack(ABC):
@@ -44,8 +45,8 @@ class Attack(ABC):
         onset = timeline.start if self.onset is None else self.onset
         if not timeline.start <= onset < timeline.end:
             raise ValueError(
-                f"attack {self.name!r}: onset {onset:g} s lies outside the game, "
-                f"which runs from {timeline.start:g} s to {timeline.end:g} s"
+                f"attack {self.name!r}: onset {written(onset)} s lies outside the game, "
+                f"which runs from {written(timeline.start)} s to {written(timeline.end)} s"
             )
         self._onset = onset
         self._timeline = timeline
@@ -55,10 +56,17 @@ class Attack(ABC):
         """Start new episodes; a random attack draws here, a block per run from the stream "opponent"."""
 
     def follow(self, velocity: Floats) -> None:  # noqa: B027 - most attacks do not care where the vehicle goes
-        """Take the vehicle's true velocity at epochs 0..K, which a spoofer tracks, (K+1, 3), ENU, m/s; after `bind`."""
+        """Take the vehicle's true velocity, which a spoofer tracks; after `bind`.
+
+        Args:
+            velocity: at the moments of the timeline's steps, (M+1, 3), ENU, m/s: at epochs 0..K where none is missing.
+        """
 
     def study(self, model: LinearModel) -> None:  # noqa: B027 - most attacks are blind to the filter
         """Take the victim's linear model, epochs 0..K, every fix used; after `follow`, and only where it is needed."""
+
+    def meet(self, satellites: Runs) -> None:  # noqa: B027 - most attacks take all satellites
+        """See the numbers of the satellites in the game, in increasing order, where the filter takes ranges."""
 
     def episode(self, runs: Runs, streams: RunStreams) -> Floats:
         """Start new episodes of some runs and look at all that they will send, (n, K+1, 3), m ENU."""

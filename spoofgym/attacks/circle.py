@@ -36,7 +36,7 @@ class Circle(Attack):
         self.radius = validation.non_negative("circle", "radius", radius)
         self.period = validation.above("circle", "period", period)
         self.direction = validation.finite("circle", "direction", direction)
-        self.onset = None if onset is None else validation.finite("circle", "onset", onset)
+        self.onset = None if onset is None else validation.time("circle", "onset", onset)
         self._centre = self.radius * heading(self.direction)
         self._ahead = self.radius * heading(self.direction - 90.0)
 

@@ -10,6 +10,7 @@ from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import EAST, heading
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
+from spoofgym.validation import written
 
 GROWTH_TIME = 30.0
 MOST_GROWTH = 100.0
@@ -38,7 +39,7 @@ class Exponential(Attack):
         self.rate = validation.non_negative("exponential", "rate", rate)
         self.time = validation.above("exponential", "time", time)
         self.direction = validation.finite("exponential", "direction", direction)
-        self.onset = None if onset is None else validation.finite("exponential", "onset", onset)
+        self.onset = None if onset is None else validation.time("exponential", "onset", onset)
         self._heading = heading(self.direction)
 
     @property
@@ -62,8 +63,8 @@ class Exponential(Attack):
         longest = timeline.end - self._onset
         if longest > MOST_GROWTH * self.time:
             raise ValueError(
-                f"attack {self.name!r}: time must be {longest / MOST_GROWTH:g} s or more in a game that goes on for "
-                f"{longest:g} s, got {self.time!r}"
+                f"attack {self.name!r}: time must be {written(longest / MOST_GROWTH)} s or more in a game that goes "
+                f"on for {written(longest)} s, got {self.time!r}"
             )
 
     def offset(self, clock: Clock) -> Floats:

@@ -79,7 +79,7 @@ class AttackFamily(Attack):
         self._first, self._last = spoofed_stretch(self._offsets)
 
     def follow(self, velocity: Floats) -> None:
-        """Find the vehicle's manoeuvres in its true velocity at epochs 0..K, (K+1, 3), m/s."""
+        """Find the vehicle's manoeuvres in its true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
         latest = self._timeline.end - LEAST_LEFT
         self._manoeuvres = tuple(time for time in manoeuvre_times(velocity, self._timeline) if time <= latest)
 

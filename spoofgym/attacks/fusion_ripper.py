@@ -8,6 +8,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.fixed_offsets import FixedOffsets
 from spoofgym.specification import spell
+from spoofgym.validation import written
 
 SCALE = 1.2
 WAIT = 10.0
@@ -18,10 +19,10 @@ MOVING = 0.1
 
 
 def lateral(velocity: Floats, side: str) -> Floats:
-    """Horizontal unit vectors at right angles to the direction of travel, (K+1, 3), ENU.
+    """Horizontal unit vectors at right angles to the direction of travel, (M+1, 3), ENU.
 
     Args:
-        velocity: at epochs 0..K, (K+1, 3), ENU, m/s.
+        velocity: at consecutive moments, (M+1, 3), ENU, m/s.
         side: "left" or "right" of the direction of travel. A vehicle that stands keeps its last direction, before it
             first moves the one in which it will.
 
@@ -71,7 +72,7 @@ class FusionRipper(FixedOffsets):
         limit: float = LIMIT,
         onset: float | None = None,
     ) -> None:
-        self.d = validation.non_negative("fusion-ripper", "d", d)
+        self.d = validation.zero_or_above("fusion-ripper", "d", d)
         self.f = validation.finite("fusion-ripper", "f", f)
         if self.f < 1.0:
             raise ValueError(f"fusion-ripper: f must be 1 or more, got {f!r}")
@@ -79,8 +80,8 @@ class FusionRipper(FixedOffsets):
         self.side = validation.one_of("fusion-ripper", "side", side, SIDES)
         self.limit = validation.finite("fusion-ripper", "limit", limit)
         if self.limit < self.d:
-            raise ValueError(f"fusion-ripper: limit must be d = {self.d:g} m or more, got {limit!r}")
-        self.onset = None if onset is None else validation.finite("fusion-ripper", "onset", onset)
+            raise ValueError(f"fusion-ripper: limit must be d = {written(self.d)} m or more, got {limit!r}")
+        self.onset = None if onset is None else validation.time("fusion-ripper", "onset", onset)
 
     @property
     def name(self) -> str:
@@ -96,12 +97,13 @@ class FusionRipper(FixedOffsets):
         )
 
     def follow(self, velocity: Floats) -> None:
-        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s.
+        """Take the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s.
 
         Raises:
             ValueError: the vehicle never moves.
         """
-        self._lay(self._distance(self._since())[:, None] * lateral(velocity, self.side))
+        _, _, epochs = self._timeline.steps
+        self._lay(self._distance(self._since())[:, None] * lateral(velocity, self.side)[epochs])
 
     def _distance(self, since: Floats) -> Floats:
         """The offset's length at times since the onset (n,), m."""

@@ -14,21 +14,20 @@ from spoofgym.specification import spell
 def path(velocity: Floats, timeline: Timeline, time: Floats) -> Floats:
     """Where the vehicle is at times up to the end of the game, from where it is at epoch 0, (n, 3), m ENU.
 
-    Its velocity runs straight between epochs and is that of epoch 0 before it, so that p(t) = p_k + v_k τ + (v_{k+1} -
-    v_k) τ² / 2Δ with τ the time since epoch k.
+    Its velocity runs straight between the moments of the timeline's steps and is that of epoch 0 before it, so that
+    p(t) = p_k + v_k τ + (v_{k+1} - v_k) τ² / 2Δ with τ the time since moment k.
 
     Args:
-        velocity: at epochs 0..K, (K+1, 3), ENU, m/s.
-        timeline: of these epochs.
+        velocity: at these moments, (M+1, 3), ENU, m/s.
+        timeline: of the game.
         time: scenario times, (n,), s.
     """
-    interval, last = timeline.interval, timeline.num_epochs
-    steps = 0.5 * interval * (velocity[1:] + velocity[:-1])
+    moments, lengths, _ = timeline.steps
+    steps = 0.5 * lengths[:, None] * (velocity[1:] + velocity[:-1])
     position = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    epochs = (time - timeline.start) / interval
-    before = np.clip(np.floor(epochs).astype(np.int64), 0, last - 1)
-    into = (epochs - before)[:, None] * interval
-    bend = 0.5 * (velocity[before + 1] - velocity[before]) * np.maximum(into, 0.0) ** 2 / interval
+    before = np.clip(np.searchsorted(moments, time, side="right") - 1, 0, len(lengths) - 1)
+    into = (time - moments[before])[:, None]
+    bend = 0.5 * (velocity[before + 1] - velocity[before]) * np.maximum(into, 0.0) ** 2 / lengths[before, None]
     return position[before] + velocity[before] * into + bend
 
 
@@ -38,7 +37,7 @@ class Meaconing(FixedOffsets):
     All three axes are shifted, backward along the vehicle's own track, by the distance that it goes in the delay: an
     attack without any knowledge of receiver or filter. A meaconer with a fixed antenna is another attack: it would show
     the receiver the position of that antenna. The clock error that a replay brings, too, is not part of a fix. The
-    track is the integral of the true velocity at the epochs; before the game it goes on straight backward.
+    track is the integral of the true velocity; before the game it goes on straight backward.
 
     Args:
         delay: s.
@@ -51,8 +50,8 @@ class Meaconing(FixedOffsets):
 
     def __init__(self, delay: float, ramp_up: float = 0.0, onset: float | None = None) -> None:
         self.delay = validation.non_negative("meaconing", "delay", delay)
-        self.ramp_up = validation.non_negative("meaconing", "ramp_up", ramp_up)
-        self.onset = None if onset is None else validation.finite("meaconing", "onset", onset)
+        self.ramp_up = validation.zero_or_above("meaconing", "ramp_up", ramp_up)
+        self.onset = None if onset is None else validation.time("meaconing", "onset", onset)
 
     @property
     def name(self) -> str:
@@ -60,7 +59,7 @@ class Meaconing(FixedOffsets):
         return spell("meaconing", self.delay, ramp_up=self.ramp_up or None, onset=self.onset)
 
     def follow(self, velocity: Floats) -> None:
-        """Take the vehicle's true velocity at epochs 0..K, (K+1, 3), ENU, m/s."""
+        """Take the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
         times, since = self._timeline.times, np.maximum(self._since(), 0.0)
         share = np.minimum(since / self.ramp_up, 1.0) if self.ramp_up else np.ones_like(since)
         shown = path(velocity, self._timeline, times - self.delay * share)

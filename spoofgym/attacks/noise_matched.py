@@ -56,7 +56,7 @@ class NoiseMatched(FixedOffsets):
     def __init__(self, level: float = LEVEL, direction: float = EAST, onset: float | None = None) -> None:
         self.level = validation.non_negative("noise-matched", "level", level)
         self.direction = validation.finite("noise-matched", "direction", direction)
-        self.onset = None if onset is None else validation.finite("noise-matched", "onset", onset)
+        self.onset = None if onset is None else validation.time("noise-matched", "onset", onset)
 
     @property
     def name(self) -> str:

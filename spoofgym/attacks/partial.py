@@ -12,6 +12,7 @@ from spoofgym.navigation.interface import Clock
 from spoofgym.specification import nest, spell
 
 DEFAULT_SATELLITES = 1
+DIGITS = 4
 
 
 class Partial(AroundAttack):
@@ -29,6 +30,8 @@ class Partial(AroundAttack):
     Raises:
         ValueError: both of the last two are given, one is not as it must be, or the attack inside is partial itself.
     """
+
+    kind = "partial"
 
     def __init__(self, attack: Attack, satellites: int | None = None, numbers: str | None = None) -> None:
         if isinstance(attack, Partial):
@@ -55,17 +58,32 @@ class Partial(AroundAttack):
             return present & np.isin(satellites, self.numbers)
         return present & (np.cumsum(present, axis=1) <= self.satellites)
 
+    def meet(self, satellites: Runs) -> None:
+        """See the numbers of the satellites in the game.
 
-def _numbers(text: str) -> tuple[int, ...]:
+        Raises:
+            ValueError: a satellite to be captured is not among them.
+        """
+        super().meet(satellites)
+        missing = sorted(set(self.numbers or ()) - set(satellites.tolist()))
+        if missing:
+            raise ValueError(
+                f"attack {self.name!r}: numbers must be those of satellites in the game, "
+                f"{'+'.join(map(str, satellites.tolist()))}, got {'+'.join(map(str, missing))}"
+            )
+
+
+def _numbers(text: object) -> tuple[int, ...]:
     """Numbers of satellites spelled ``3+17``.
 
     Raises:
         ValueError: they are not whole numbers, each once.
     """
-    pieces = str(text).split("+")
-    numbers = tuple(int(piece) for piece in pieces if piece.isascii() and piece.isdigit())
+    pieces = text.split("+") if isinstance(text, str) else [""]
+    numbers = tuple(int(piece) for piece in pieces if piece.isascii() and piece.isdigit() and len(piece) <= DIGITS)
     if len(numbers) < len(pieces) or len(set(numbers)) < len(numbers):
         raise ValueError(
-            f"partial: numbers must be those of satellites, each once, with + between, e.g. 3+17; got {text!r}"
+            f"partial: numbers must be those of satellites, each once, with + between, e.g. 3+17; got "
+            f"{validation.shown(text)}"
         )
     return numbers

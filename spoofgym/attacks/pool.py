@@ -84,7 +84,7 @@ class AttackPool(Attack):
         self._runs = np.arange(num_runs)
 
     def follow(self, velocity: Floats) -> None:
-        """Tell every member the vehicle's true velocity at epochs 0..K, (K+1, 3), m/s."""
+        """Tell every member the vehicle's true velocity at the moments of the game's steps, (M+1, 3), ENU, m/s."""
         for member in self._members:
             member.follow(velocity)
 
@@ -93,6 +93,11 @@ class AttackPool(Attack):
         for member in self._members:
             if member.needs_model:
                 member.study(model)
+
+    def meet(self, satellites: Runs) -> None:
+        """Tell every member the numbers of the satellites in the game."""
+        for member in self._members:
+            member.meet(satellites)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the opponents of new episodes, and all that these will do."""

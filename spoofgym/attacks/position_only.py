@@ -25,6 +25,8 @@ class PositionOnly(AroundAttack):
         ValueError: the attack inside leaves the velocity true already.
     """
 
+    kind = "position-only"
+
     def __init__(self, attack: Attack) -> None:
         if isinstance(attack, PositionOnly):
             raise ValueError(f"position-only: attack must not leave the velocity true itself, got {attack.name!r}")

@@ -14,6 +14,7 @@ from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
+from spoofgym.validation import written
 
 EAST = 90.0
 AXES = "enu"
@@ -58,7 +59,7 @@ class Ramp(Attack):
     def __init__(self, rate: float, direction: float = EAST, onset: float | None = None) -> None:
         self.rate = validation.non_negative("ramp", "rate", rate)
         self.direction = validation.finite("ramp", "direction", direction)
-        self.onset = None if onset is None else validation.finite("ramp", "onset", onset)
+        self.onset = None if onset is None else validation.time("ramp", "onset", onset)
         self._velocity = self.rate * heading(self.direction)
 
     @property
@@ -88,7 +89,7 @@ class JumpRamp(Attack):
         self.rate = validation.non_negative("jump-ramp", "rate", rate)
         self.jump = validation.non_negative("jump-ramp", "jump", jump)
         self.direction = validation.finite("jump-ramp", "direction", direction)
-        self.onset = None if onset is None else validation.finite("jump-ramp", "onset", onset)
+        self.onset = None if onset is None else validation.time("jump-ramp", "onset", onset)
         self._heading = heading(self.direction)
 
     @property
@@ -128,11 +129,14 @@ class RandomProfile(Attack):
     def __init__(self, mean: float, variance: float, onset: float | None, axes: str, end: float | None) -> None:
         self.mean = validation.finite(self.kind, "mean", mean)
         self.variance = validation.non_negative(self.kind, "variance", variance)
-        self.onset = None if onset is None else validation.finite(self.kind, "onset", onset)
-        if not axes or any(letter not in AXES or axes.count(letter) > 1 for letter in axes):
-            raise ValueError(f"{self.kind}: axes must be letters of 'enu', each at most once, got {axes!r}")
+        self.onset = None if onset is None else validation.time(self.kind, "onset", onset)
+        text = validation.text(self.kind, "axes", axes)
+        if any(letter not in AXES or text.count(letter) > 1 for letter in text):
+            raise ValueError(
+                f"{self.kind}: axes must be letters of 'enu', each at most once, got {validation.shown(axes)}"
+            )
         self.axes = axes
-        self.end = None if end is None else validation.finite(self.kind, "end", end)
+        self.end = None if end is None else validation.time(self.kind, "end", end)
 
     @property
     def name(self) -> str:
@@ -154,9 +158,11 @@ class RandomProfile(Attack):
         """
         super().bind(timeline, num_runs)
         if self.end is not None and not self.end > self._onset:
-            raise ValueError(f"attack {self.name!r}: end {self.end:g} s must be after the onset, {self._onset:g} s")
+            raise ValueError(
+                f"attack {self.name!r}: end {written(self.end)} s must be after the onset, {written(self._onset)} s"
+            )
         index = np.arange(timeline.num_epochs + 1)
-        clock = Clock(index, np.asarray(timeline.start + timeline.interval * index, dtype=np.float64))
+        clock = Clock(index, timeline.times)
         self._runs = np.arange(num_runs)
         self._columns = [AXES.index(letter) for letter in self.axes]
         self._elapsed = self.elapsed(clock)

@@ -15,6 +15,8 @@ SPEED_OF_LIGHT = 299_792_458.0
 """m/s."""
 DISTANCE = 500.0
 PROCESSING = 1e-6
+LONGEST_PROCESSING = 1.0
+"""s: light goes 300,000 km in it."""
 
 
 def control_delay(offset: Floats, clock: float, spoofer: Floats, processing: float, line_of_sight: Floats) -> Floats:
@@ -97,10 +99,10 @@ class LiuSpoofer(Attack):
         self.jump = validation.non_negative(self.kind, "jump", jump)
         self.clock_jump = validation.finite(self.kind, "clock_jump", clock_jump)
         self.clock_rate = validation.finite(self.kind, "clock_rate", clock_rate)
-        self.processing = validation.non_negative(self.kind, "processing", processing)
+        self.processing = validation.non_negative(self.kind, "processing", processing, LONGEST_PROCESSING)
         self.distance = validation.non_negative(self.kind, "distance", distance)
         self.advance = validation.share(self.kind, "advance", advance)
-        self.onset = None if onset is None else validation.finite(self.kind, "onset", onset)
+        self.onset = None if onset is None else validation.time(self.kind, "onset", onset)
         self._heading = heading(self.direction)
         delay = SPEED_OF_LIGHT * self.processing + self.distance
         self._clock_jump = (1.0 - self.advance) * delay + self.clock_jump

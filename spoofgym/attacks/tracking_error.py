@@ -14,6 +14,8 @@ from spoofgym.specification import nest, spell
 from spoofgym.streams import RunStreams
 
 SIGMA = 0.3
+MOST_SIGMA = 1e6
+"""m."""
 AXES = ("east", "north", "up")
 
 
@@ -39,12 +41,14 @@ class TrackingError(AroundAttack):
             already.
     """
 
+    kind = "tracking-error"
+
     def __init__(self, attack: Attack, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> None:
         if isinstance(attack, TrackingError):
             raise ValueError(f"tracking-error: attack must have no tracking error of its own, got {attack.name!r}")
         super().__init__(attack)
-        self.sigma = validation.non_negative("tracking-error", "sigma", sigma)
-        self.time = validation.non_negative("tracking-error", "time", time)
+        self.sigma = validation.non_negative("tracking-error", "sigma", sigma, MOST_SIGMA)
+        self.time = validation.zero_or_above("tracking-error", "time", time)
         self.axis = None if axis is None else validation.one_of("tracking-error", "axis", axis, AXES)
         self._errs = np.array([axis in (None, name) for name in AXES])
 
@@ -70,7 +74,7 @@ class TrackingError(AroundAttack):
         shape = self._errors.shape[1:]
         for run in runs.tolist():
             stream = streams(run, "tracking")
-            error = draw_tracking_error(stream, shape, self.sigma, self.time, self._timeline.interval)
+            error = draw_tracking_error(stream, shape, self.sigma, self.time, self._timeline.intervals)
             self._errors[run] = np.where(self._errs, error, 0.0)
 
     def offset(self, clock: Clock) -> Floats:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 
+from spoofgym import validation
 from spoofgym.detectors.acceleration import Acceleration
 from spoofgym.detectors.acna import Acna
 from spoofgym.detectors.aime import Aime
@@ -46,8 +47,9 @@ BETWEEN_MEMBERS = re.compile(r"(?<!\d[eE])\+")
 
 def _ensemble(members: str = ENSEMBLE, threshold: float | None = None, arl0: float | None = None) -> Ensemble:
     """The ensemble of members spelled ``detector+detector``, each with ``/`` in place of its commas."""
-    asked = Ensemble.default_arl0 if arl0 is None else arl0
-    return Ensemble([_member(text, asked) for text in BETWEEN_MEMBERS.split(members)], threshold, arl0)
+    asked = Ensemble.default_arl0 if arl0 is None else validation.average_run_length("ensemble", "arl0", arl0)
+    pieces = BETWEEN_MEMBERS.split(validation.text("ensemble", "members", members))
+    return Ensemble([_member(text, asked) for text in pieces], threshold, arl0)
 
 
 def _member(text: str, arl0: float) -> Detector:
@@ -60,7 +62,7 @@ def _member(text: str, arl0: float) -> Detector:
         return make_detector(at_arl0(unnest(text), arl0))
     except ValueError as error:
         raise ValueError(
-            f"ensemble: member {text!r}: {error} (within a member '/' stands for ',' and '~' for '+')"
+            f"ensemble: member {validation.shown(text)}: {error} (within a member '/' stands for ',' and '~' for '+')"
         ) from error
 
 

@@ -48,7 +48,7 @@ class Acceleration(ThresholdDetector):
     in_position = True
 
     def __init__(self, n: int = DEFAULT_LAG, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1)
         self.set_up(threshold, arl0, n=self.n)
 
     def bind(self, num_runs: int, dimension: int) -> None:

@@ -96,8 +96,13 @@ class Acna(Detector):
         arl0: float | None = None,
         position: str = "innovation",
     ) -> None:
-        self.jump_epochs = validation.whole("acna", "jump_epochs", jump_epochs, 2)
-        self.slow_epochs = validation.whole("acna", "slow_epochs", slow_epochs, self.jump_epochs + 1)
+        self.jump_epochs = validation.epochs("acna", "jump_epochs", jump_epochs, 2)
+        self.slow_epochs = validation.epochs("acna", "slow_epochs", slow_epochs, 3)
+        if self.slow_epochs <= self.jump_epochs:
+            raise ValueError(
+                f"acna: slow_epochs must be a whole number, {self.jump_epochs + 1} or more, got {self.slow_epochs}: "
+                f"more than jump_epochs = {self.jump_epochs}"
+            )
         self.memory = self.slow_epochs - 1
         validation.at_most_one("acna", jump_threshold=jump_threshold, preset=preset, arl0=arl0)
         validation.at_most_one("acna", slow_threshold=slow_threshold, preset=preset, arl0=arl0)
@@ -119,7 +124,7 @@ class Acna(Detector):
         if given or preset is not None:
             self.threshold = 1.0
         else:
-            self.target_arl0 = validation.above("acna", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
+            self.target_arl0 = validation.average_run_length("acna", "arl0", DEFAULT_ARL0 if arl0 is None else arl0)
         self._name = spell(
             "acna",
             jump_epochs=None if self.jump_epochs == SONG_JUMP_EPOCHS else self.jump_epochs,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.window_bank import window_lengths
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WINDOWS = "30+60+120"

@@ -6,6 +6,8 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
+import numpy as np
+
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs, take_runs
 from spoofgym.navigation.facts import FilterFacts
@@ -21,7 +23,7 @@ class Detector(ABC):
     all of them by one factor, which is then the threshold.
 
     Attributes:
-        threshold: alarm where statistic > threshold; None until `bind` or calibration sets it.
+        threshold: alarm where statistic > threshold; positive and finite, None until `bind` or calibration sets it.
         arl0: the average run length between false alarms at the threshold, in epochs; None if unknown. Unless
             ``calibrated`` it holds for white innovations (a matched filter) only.
         arl0_interval: its 95 % interval, epochs; None unless ``calibrated``.
@@ -73,7 +75,10 @@ class Detector(ABC):
 
     @abstractmethod
     def update(self, epoch: Epoch) -> Floats:
-        """The statistic after this epoch, (N,)."""
+        """The statistic after this epoch, (N,): real numbers, of which +inf is a certain alarm; NaN and -inf never are.
+
+        Whoever runs a detector calls `statistic_of`, which holds it to this.
+        """
 
     def set_threshold(
         self,
@@ -119,6 +124,56 @@ def seen(detector: Detector, epoch: Epoch) -> Epoch:
     return epoch.in_position if detector.in_position else epoch
 
 
+def statistic_of(detector: Detector, epoch: Epoch) -> Floats:
+    """Let a detector see an epoch; its statistic, (N,).
+
+    NaN and -inf are refused, for they exceed no threshold: the detector would be blind and nobody would know.
+
+    Raises:
+        ValueError: naming the detector and what it gave instead of N real numbers.
+    """
+    given: object = detector.update(seen(detector, epoch))
+    statistic, runs = _real_array(given), len(epoch.index)
+    if statistic is None or statistic.shape != (runs,):
+        got = f"{given.dtype} of shape {given.shape}" if isinstance(given, np.ndarray) else repr(given)
+        raise ValueError(
+            f"detector {detector.name!r}: update must return the statistics of {runs} runs, real numbers in an array "
+            f"of shape ({runs},), got {got}"
+        )
+    blind = ~(statistic > -np.inf)
+    if blind.any():
+        run = int(blind.argmax())
+        raise ValueError(
+            f"detector {detector.name!r}: update must return numbers, or +inf for a certain alarm; it returned "
+            f"{statistic[run]} in run {run}, which exceeds no threshold"
+        )
+    return statistic
+
+
+def _real_array(given: object) -> Floats | None:
+    try:
+        values = np.asarray(given)
+    except ValueError:  # sequences of different lengths
+        return None
+    return values.astype(np.float64, copy=False) if values.dtype.kind in "fiub" else None
+
+
+def require_threshold(detector: Detector) -> float:
+    """The threshold of a detector.
+
+    Raises:
+        ValueError: it has none yet, or that of the detector or of a member is not a positive finite number.
+    """
+    if detector.threshold is None:
+        raise ValueError(f"detector {detector.name!r} has no threshold yet: calibrate it first")
+    for part in (*detector.members, detector):
+        given: object = part.threshold
+        number = isinstance(given, float | int | np.integer | np.floating)
+        if given is not None and not (number and 0.0 < given < np.inf):  # type: ignore[operator]
+            raise ValueError(f"detector {part.name!r}: threshold must be a finite number greater than 0, got {given}")
+    return detector.threshold
+
+
 def seen_dimension(detector: Detector, dimension: int, ranges: bool) -> int:
     """The dimension of the innovations that it sees, where the filter's is ``dimension``, of ranges or of fixes."""
     return 3 if ranges and detector.in_position else dimension
@@ -152,7 +207,7 @@ class ThresholdDetector(Detector):
             self.threshold = validation.above(self.kind, "threshold", threshold)
         else:
             given = self.default_arl0 if arl0 is None else arl0
-            self.target_arl0 = validation.above(self.kind, "arl0", given, 1.0)
+            self.target_arl0 = validation.average_run_length(self.kind, "arl0", given)
         parameters = inspect.signature(type(self).__init__).parameters
         other = {key: value for key, value in options.items() if value != parameters[key].default}
         asked = None if self.target_arl0 == self.default_arl0 else self.target_arl0

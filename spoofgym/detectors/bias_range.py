@@ -55,7 +55,7 @@ class BiasRange(Detector):
         if arl0 is None:
             self.threshold = 1.0
         else:
-            self.factor, self.target_arl0 = 1.0, validation.above("bias-range", "arl0", arl0, 1.0)
+            self.factor, self.target_arl0 = 1.0, validation.average_run_length("bias-range", "arl0", arl0)
         if (gyro is None) != (accelerometer is None):
             alone, other = ("accelerometer", "gyro") if gyro is None else ("gyro", "accelerometer")
             raise ValueError(f"bias-range: {alone} needs {other} beside it")

@@ -122,7 +122,7 @@ class Snapshot(Detector):
     ) -> None:
         validation.at_most_one("snapshot", threshold=threshold, p_fa=p_fa, preset=preset, arl0=arl0)
         self.threshold = None if threshold is None else validation.above("snapshot", "threshold", threshold)
-        self.target_arl0 = None if arl0 is None else validation.above("snapshot", "arl0", arl0, 1.0)
+        self.target_arl0 = None if arl0 is None else validation.average_run_length("snapshot", "arl0", arl0)
         self._p_fa = None if p_fa is None else validation.probability("snapshot", "p_fa", p_fa)
         self._preset = None if preset is None else validation.one_of("snapshot", "preset", preset, self.PRESETS)
         self._name = spell("snapshot", threshold=self.threshold, p_fa=self._p_fa, preset=preset, arl0=self.target_arl0)
@@ -201,7 +201,7 @@ class Windowed(Detector):
         preset: str | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole("windowed", "n", n, 1)
+        self.n = validation.epochs("windowed", "n", n, 1)
         self.memory = self.n - 1
         validation.at_most_one("windowed", threshold=threshold, p_fa=p_fa, preset=preset, arl0=arl0)
         self.threshold = None if threshold is None else validation.above("windowed", "threshold", threshold)
@@ -211,7 +211,7 @@ class Windowed(Detector):
             valid = " and ".join(str(terms) for terms in FOI_THRESHOLDS)
             raise ValueError(f"windowed: preset foi is for n = {valid} (k + 1), got {self.n}")
         if threshold is None and p_fa is None and preset is None:
-            self.target_arl0 = validation.above("windowed", "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
+            self.target_arl0 = validation.average_run_length("windowed", "arl0", DEFAULT_ARL0 if arl0 is None else arl0)
         self._name = spell(
             "windowed",
             n=None if self.n == DEFAULT_WINDOW else self.n,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
@@ -11,6 +10,7 @@ from spoofgym.detectors import cpi_theory
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_P_FA
 from spoofgym.detectors.ring import MovingSum
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.specification import spell
 
@@ -24,16 +24,21 @@ def unit_vector(owner: str, direction: float | str) -> Floats:
 
     Args:
         owner: whose option, for the message.
-        direction: the spelling.
+        direction: the name, or the azimuth as a number or its text.
 
     Raises:
         ValueError: it is none of these.
     """
     if isinstance(direction, str):
-        if direction not in AXES:
+        if direction in AXES:
+            return np.array(AXES[direction])
+        try:
+            direction = float(direction)
+        except ValueError:
             valid = ", ".join(AXES)
-            raise ValueError(f"{owner}: direction must be {valid} or an azimuth in degrees, got {direction!r}")
-        return np.array(AXES[direction])
+            raise ValueError(
+                f"{owner}: direction must be {valid} or an azimuth in degrees, got {validation.shown(direction)}"
+            ) from None
     azimuth = np.radians(validation.finite(owner, "direction", direction))
     return np.array([np.sin(azimuth), np.cos(azimuth), 0.0])
 
@@ -68,7 +73,7 @@ def kappa(innovation: Innovation, sigma: float, direction: float | str = UP) -> 
         direction: ``east``, ``north``, ``up``, or an azimuth in degrees.
 
     Raises:
-        ValueError: another direction.
+        ValueError: another direction, or a sigma that is negative or not finite.
     """
     return cpi_theory.kappa(sigma, projected(innovation, unit_vector("kappa", direction))[1])
 
@@ -109,16 +114,17 @@ class Cpi(Detector):
         p_fa: float | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole("cpi", "n", n, 1)
+        self.n = validation.epochs("cpi", "n", n, 1)
         self.memory = self.n - 1
         self.direction = unit_vector("cpi", direction)
         validation.at_most_one("cpi", threshold=threshold, p_fa=p_fa, arl0=arl0)
         if arl0 is not None:
-            self.target_arl0 = validation.above("cpi", "arl0", arl0, 1.0)
+            self.target_arl0 = validation.average_run_length("cpi", "arl0", arl0)
         elif threshold is not None:
             self.threshold = validation.above("cpi", "threshold", threshold)
         else:
-            self.threshold = cpi_theory.cpi_threshold(DEFAULT_P_FA if p_fa is None else p_fa, self.n)
+            p_exceeds = validation.probability("cpi", "p_fa", DEFAULT_P_FA if p_fa is None else p_fa)
+            self.threshold = cpi_theory.cpi_threshold(p_exceeds, self.n)
         self._name = spell(
             "cpi",
             n=None if self.n == DEFAULT_WINDOW else self.n,

@@ -14,6 +14,8 @@ from spoofgym.navigation.interface import Epoch
 
 DEFAULT_SCALE = 1.5
 DEFAULT_SHIFT = 0.25
+LEAST_SCALE, LEAST_SHIFT = 1.02, 0.025
+"""Of k of the two tests: with a smaller one they forget their start in no less than 10,000 epochs."""
 POSITION = 3
 """Axes of a position."""
 LEAST_MEMORY = 60
@@ -54,7 +56,7 @@ class Cusum(ThresholdDetector):
     kind = "cusum"
 
     def __init__(self, k: float = DEFAULT_SCALE, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.k = validation.above(self.kind, "k", k, 1.0)
+        self.k = validation.between(self.kind, "k", k, LEAST_SCALE, validation.LARGEST)
         self.memory = forgetting(POSITION * (self.k - 1.0), 2.0 * POSITION)
         self.set_up(threshold, arl0, k=self.k)
 
@@ -102,7 +104,7 @@ class SignedCusum(ThresholdDetector):
     in_position = True
 
     def __init__(self, k: float = DEFAULT_SHIFT, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.k = validation.above(self.kind, "k", k)
+        self.k = validation.between(self.kind, "k", k, LEAST_SHIFT, validation.LARGEST)
         self.memory = forgetting(self.k, 1.0)
         self.set_up(threshold, arl0, k=self.k)
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.detectors.base import Detector, ThresholdDetector, seen, seen_dimension
+from spoofgym.detectors.base import Detector, ThresholdDetector, seen_dimension, statistic_of
 from spoofgym.navigation.facts import RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.specification import nest
@@ -85,5 +85,5 @@ class Ensemble(ThresholdDetector):
         for member in self.members:
             if member.threshold is None:
                 raise RuntimeError(f"detector {self.name!r}: member {member.name!r} has no threshold yet: calibrate it")
-            np.maximum(largest, member.update(seen(member, epoch)) / member.threshold, out=largest)
+            np.maximum(largest, statistic_of(member, epoch) / member.threshold, out=largest)
         return largest

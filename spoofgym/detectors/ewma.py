@@ -14,6 +14,8 @@ from spoofgym.detectors.cusum import LEAST_MEMORY, POSITION, TIME_CONSTANTS
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WEIGHT = 0.05
+LEAST_WEIGHT, MOST_WEIGHT = 3e-4, 1.0 - 1e-9
+"""A smaller one forgets its start in no less than 10,000 epochs, a weight of 1 has no memory."""
 
 
 def forgetting(weight: float) -> int:
@@ -32,7 +34,7 @@ class _ExponentialAverage(ThresholdDetector):
     def __init__(
         self, weight: float = DEFAULT_WEIGHT, threshold: float | None = None, arl0: float | None = None
     ) -> None:
-        self.weight = validation.probability(self.kind, "weight", weight)
+        self.weight = validation.between(self.kind, "weight", weight, LEAST_WEIGHT, MOST_WEIGHT)
         self.memory = forgetting(self.weight)
         self._variance = steady_variance(self.weight)
         self.set_up(threshold, arl0, weight=self.weight)

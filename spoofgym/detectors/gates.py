@@ -44,7 +44,7 @@ def at_least_one_sigma(owner: str, name: str, value: float) -> float:
     """
     gate = validation.finite(owner, name, value)
     if gate < 1.0:
-        raise ValueError(f"{owner}: {name} must be 1 sigma or more, got {value!r}")
+        raise ValueError(f"{owner}: {name} must be 1 sigma or more, got {validation.shown(value)}")
     return gate
 
 
@@ -68,7 +68,7 @@ class Gate(ThresholdDetector):
         if arl0 is None:
             self.threshold = 1.0
         else:
-            self.target_arl0 = validation.above(self.kind, "arl0", arl0, 1.0)
+            self.target_arl0 = validation.average_run_length(self.kind, "arl0", arl0)
         self._name = spell(self.kind, gate=None if self.gate == DEFAULT_GATE else self.gate, arl0=self.target_arl0)
 
 

@@ -49,7 +49,7 @@ class KujurMonitor(Ensemble):
         arl0: float | None = None,
     ) -> None:
         validation.at_most_one(self.kind, p_fa=p_fa, arl0=arl0)
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
         self.direction = validation.one_of(self.kind, "direction", direction, tuple(AXES))
         self.p_fa = validation.probability(self.kind, "p_fa", DEFAULT_P_FA if p_fa is None else p_fa) / 2.0
         self.p_md_cpi = validation.probability(self.kind, "p_md_cpi", p_md_cpi)

@@ -42,7 +42,7 @@ class MeanInnovation(ThresholdDetector):
     in_position = True
 
     def __init__(self, n: int = DEFAULT_WINDOW, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1)
         self.memory = self.n - 1
         self.set_up(threshold, arl0, n=self.n)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.ring import MovingSum
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WINDOW = 20
@@ -55,7 +55,7 @@ class FiniteMovingAverage(ThresholdDetector):
         threshold: float | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1)
         self.memory = self.n - 1
         self.shift = validation.above(self.kind, "shift", shift)
         self.set_up(threshold, arl0, n=self.n, shift=self.shift)

@@ -14,12 +14,12 @@ triangular and the code comes first, so that the first S components of w = L‚Åª¬
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_P_FA, at_all_degrees, nominal_p_fa, quantile
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.facts import RANGES, FilterFacts
 from spoofgym.navigation.interface import Epoch, Innovation
@@ -62,7 +62,7 @@ class Raim(Detector):
         validation.at_most_one("raim", threshold=threshold, p_fa=p_fa, arl0=arl0)
         self._given = None if threshold is None else validation.above("raim", "threshold", threshold)
         self._p_fa = None if p_fa is None else validation.probability("raim", "p_fa", p_fa)
-        self.target_arl0 = None if arl0 is None else validation.above("raim", "arl0", arl0, 1.0)
+        self.target_arl0 = None if arl0 is None else validation.average_run_length("raim", "arl0", arl0)
         self.threshold = self._given
         self._name = spell("raim", threshold=self._given, p_fa=self._p_fa, arl0=self.target_arl0)
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
+from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.facts import LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Epoch
@@ -48,7 +48,7 @@ class RampBank(ThresholdDetector):
     needs = (LINEAR_MODEL,)
 
     def __init__(self, length: int = DEFAULT_LENGTH, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.length = validation.whole(self.kind, "length", length, 1)
+        self.length = validation.epochs(self.kind, "length", length, 1, validation.LONGEST_TABLE)
         self.memory = self.length - 1
         self.set_up(threshold, arl0, length=self.length)
 

@@ -90,8 +90,8 @@ class RelativeMotion(Detector):
         arl0: float | None = None,
     ) -> None:
         kind = self.KIND
-        self.k = validation.whole(kind, "k", k, 1)
-        self.lag = self.k if lag is None else validation.whole(kind, "lag", lag, 1)
+        self.k = validation.epochs(kind, "k", k, 1)
+        self.lag = self.k if lag is None else validation.epochs(kind, "lag", lag, 1)
         if self.lag > self.k:
             raise ValueError(f"{kind}: lag must be a whole number from 1 to k = {self.k}, got {lag!r}")
         validation.at_most_one(kind, threshold=threshold, preset=preset, arl0=arl0)
@@ -103,7 +103,7 @@ class RelativeMotion(Detector):
         elif preset is not None:
             self.threshold = None if self.slope is None else self._preset
         else:
-            self.target_arl0 = validation.above(kind, "arl0", DEFAULT_ARL0 if arl0 is None else arl0, 1.0)
+            self.target_arl0 = validation.average_run_length(kind, "arl0", DEFAULT_ARL0 if arl0 is None else arl0)
         self.lacks_slope = self.slope is None
         self._name = spell(
             kind,

@@ -13,20 +13,25 @@ class Ring:
     Every run writes at its own place, which a reset takes back to the start: what a run holds, and in which order,
     depends on its own episode alone. Reduce ``values`` along axis 1, of fixed length: the result of a run is then
     bit-identical for any N.
-
-    Attributes:
-        values: (N, n) or (N, n, width), in no particular order.
     """
 
     def __init__(self, num_runs: int, length: int, width: int | None = None, empty: float = 0.0) -> None:
         shape = () if width is None else (width,)
-        self.values: Floats = np.full((num_runs, length, *shape), empty)
         self._empty = empty
-        self._flat = self.values.reshape(num_runs * length, *shape)
+        self._shape = (num_runs, length, *shape)
+        self._flat: Floats = np.full((num_runs * length, *shape), empty)
         self._start = np.arange(num_runs) * length
         self._place = self._start.copy()
         self._next = np.arange(1, num_runs * length + 1)
         self._next[length - 1 :: length] -= length
+
+    @property
+    def values(self) -> Floats:
+        """What each run holds, (N, n) or (N, n, width), in no particular order; write to it to change it.
+
+        Formed anew at each call: an attribute that is a view of another one would part from it in a copy of the ring.
+        """
+        return self._flat.reshape(self._shape)
 
     @property
     def oldest(self) -> Floats:

@@ -71,18 +71,19 @@ class SeparationBank(ThresholdDetector):
         arl0: float | None = None,
     ) -> None:
         validation.at_most_one(self.kind, p_fa=p_fa, arl0=arl0)
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
         self.memory = self.n - 1
         self.direction = validation.one_of(self.kind, "direction", direction, tuple(DIRECTIONS))
         axes = DIRECTIONS[self.direction]
         self.p_md = validation.probability(self.kind, "p_md", p_md) / len(axes)
         self.p_fa = validation.probability(self.kind, "p_fa", DEFAULT_P_FA if p_fa is None else p_fa)
+        split = validation.boolean(self.kind, "split", split)
         self.scale = 1.0
         self.multiplier = float(separation_threshold(self.p_fa, len(axes) * (self.n if split else 1), 1.0))
         if arl0 is None:
             self.threshold = 1.0
         else:
-            self.target_arl0 = validation.above(self.kind, "arl0", arl0, 1.0)
+            self.target_arl0 = validation.average_run_length(self.kind, "arl0", arl0)
         self._name = spell(
             self.kind,
             n=None if n == DEFAULT_WINDOW else self.n,

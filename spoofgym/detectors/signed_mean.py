@@ -52,7 +52,7 @@ class SignedMean(ThresholdDetector):
         p_fa: float | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1)
         self.memory = self.n - 1
         validation.at_most_one(self.kind, threshold=threshold, p_fa=p_fa, arl0=arl0)
         self.set_up(threshold, arl0, n=self.n, p_fa=p_fa)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
+from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.facts import LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Epoch
@@ -50,7 +50,7 @@ class SolutionSeparation(ThresholdDetector):
     needs = (LINEAR_MODEL,)
 
     def __init__(self, n: int = DEFAULT_WINDOW, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
         self.memory = self.n - 1
         self.set_up(threshold, arl0, n=self.n)
 

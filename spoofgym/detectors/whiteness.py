@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_WINDOW = 60
@@ -51,8 +51,8 @@ class Whiteness(ThresholdDetector):
         threshold: float | None = None,
         arl0: float | None = None,
     ) -> None:
-        self.n = validation.whole(self.kind, "n", n, 2)
-        self.lags = validation.whole(self.kind, "lags", lags, 1)
+        self.n = validation.epochs(self.kind, "n", n, 2)
+        self.lags = validation.epochs(self.kind, "lags", lags, 1)
         if self.lags >= self.n:
             raise ValueError(f"{self.kind}: lags must be less than n = {self.n}, got {lags!r}")
         self.memory = self.n - 1

@@ -12,9 +12,10 @@ from spoofgym.detectors.ring import MovingSum
 from spoofgym.navigation.interface import Epoch
 
 DEFAULT_LENGTHS = "5+10+20+60"
+DIGITS = len(str(validation.LONGEST))
 
 
-def window_lengths(owner: str, name: str, text: str) -> tuple[int, ...]:
+def window_lengths(owner: str, name: str, text: object) -> tuple[int, ...]:
     """Lengths spelled ``5+10+20``, in epochs.
 
     Args:
@@ -23,15 +24,16 @@ def window_lengths(owner: str, name: str, text: str) -> tuple[int, ...]:
         text: the spelling.
 
     Raises:
-        ValueError: they are not whole numbers, 1 or more, each greater than the one before.
+        ValueError: they are not whole numbers, 1 or more, each greater than the one before, 10,000 at most.
     """
-    pieces = text.split("+")
-    lengths = tuple(int(piece) for piece in pieces if piece.isascii() and piece.isdigit())
+    pieces = text.split("+") if isinstance(text, str) else [""]
+    lengths = tuple(int(piece) for piece in pieces if piece.isascii() and piece.isdigit() and len(piece) <= DIGITS)
     # a zero before the first makes it 1 or more
     increasing = all(before < after for before, after in zip((0, *lengths), lengths, strict=False))
-    if len(lengths) < len(pieces) or not increasing:
+    if len(lengths) < len(pieces) or not increasing or lengths[-1] > validation.LONGEST:
         raise ValueError(
-            f"{owner}: {name} must be whole numbers, 1 or more and increasing, with + between, e.g. 5+20; got {text!r}"
+            f"{owner}: {name} must be whole numbers, 1 or more, increasing and {validation.LONGEST} at most, with + "
+            f"between, e.g. 5+20; got {validation.shown(text)}"
         )
     return lengths
 

@@ -18,6 +18,13 @@ ON_ALARM = ("end", "respond")
 
 DEFENDER_DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "relative-motion:k=20")
 
+MOST_FRAMES = 1000
+"""Epochs that an observation may hold."""
+MOST_WEIGHT = 1e6
+"""Of a reward term, and of the spoofer's tracking error, m."""
+SCALES = (1e-6, 1e6)
+"""Least and largest scale of an error, m, and largest cost of one."""
+
 Config = TypeVar("Config")
 
 
@@ -34,19 +41,31 @@ def configure(kind: type[Config], arguments: dict[str, Any]) -> Config:
     return kind(**arguments)
 
 
-def require(name: str, value: str, valid: tuple[str, ...]) -> None:
-    """Refuse a value that is not one of ``valid``.
+def check_options(owner: str, options: object, valid: tuple[str, ...] = ()) -> None:
+    """Refuse options of a reset that the environment does not have.
 
     Raises:
-        ValueError: naming the value and the valid ones.
+        TypeError: they are no dictionary.
+        ValueError: an unknown one; the message lists the valid ones.
     """
-    if value not in valid:
-        raise ValueError(f"unknown {name} {value!r}; valid values: {', '.join(valid)}")
+    if options is None:
+        return
+    validation.instance(owner, "options", options, dict, "a dictionary or None")
+    for key in options:  # type: ignore[attr-defined]
+        if key not in valid:
+            known = f"valid options: {', '.join(valid)}" if valid else "there are none"
+            raise ValueError(f"{owner}: options: reset has no option {validation.shown(key)}; {known}")
 
 
-def _require_coupling(coupling: str | None) -> None:
+def _set(config: Any, **values: object) -> None:
+    """Put checked values in place of those given: 3 for 3.0, a number for a NumPy scalar."""
+    for name, value in values.items():
+        object.__setattr__(config, name, value)
+
+
+def _check_coupling(owner: str, coupling: object) -> None:
     if coupling is not None:
-        require("coupling", coupling, COUPLINGS)
+        validation.one_of(owner, "coupling", coupling, COUPLINGS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,10 +92,12 @@ class SpooferConfig:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        _require_coupling(self.coupling)
-        require("knowledge", self.knowledge, KNOWLEDGE)
-        require("action", self.action, ACTIONS)
-        require("on_alarm", self.on_alarm, ON_ALARM)
+        owner = "Spoofer-v0"
+        _check_coupling(owner, self.coupling)
+        validation.one_of(owner, "knowledge", self.knowledge, KNOWLEDGE)
+        validation.one_of(owner, "action", self.action, ACTIONS)
+        validation.one_of(owner, "on_alarm", self.on_alarm, ON_ALARM)
+        validation.text(owner, "fidelity", self.fidelity)
         if self.action == "innovation" and self.knowledge == "blind":
             raise ValueError(
                 "action 'innovation' runs a shadow filter: knowledge must be 'shadow' or 'full', not 'blind'"
@@ -85,14 +106,14 @@ class SpooferConfig:
             raise ValueError(
                 f"shadow {self.shadow!r} needs knowledge 'shadow' or 'full': a 'blind' spoofer has no shadow filter"
             )
-        validation.whole("Spoofer-v0", "frames", self.frames, 1)
-        if not 0 <= self.forfeit < float("inf"):
-            raise ValueError(f"forfeit must be 0 or more and finite, got {self.forfeit}")
-        if not 0 <= self.tracking_sigma < float("inf"):
-            raise ValueError(f"tracking_sigma must be 0 or more metres, got {self.tracking_sigma}")
-        validation.non_negative("Spoofer-v0", "tracking_time", self.tracking_time)
-        if self.threads < 1:
-            raise ValueError(f"threads must be 1 or more, got {self.threads}")
+        _set(
+            self,
+            frames=validation.whole(owner, "frames", self.frames, 1, MOST_FRAMES),
+            forfeit=validation.non_negative(owner, "forfeit", self.forfeit, MOST_WEIGHT),
+            tracking_sigma=validation.non_negative(owner, "tracking_sigma", self.tracking_sigma, MOST_WEIGHT),
+            tracking_time=validation.zero_or_above(owner, "tracking_time", self.tracking_time),
+            threads=validation.threads(owner, self.threads),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,14 +138,17 @@ class DefenderConfig:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        _require_coupling(self.coupling)
-        for name in ("clean", "outage", "multipath"):
-            validation.share("Defender-v0", name, getattr(self, name))
-        if self.error_scale is not None and not 0.0 < self.error_scale < float("inf"):
-            raise ValueError(f"error_scale must be positive metres, or None for the scenario's, got {self.error_scale}")
-        if not 0.0 < self.error_clip < float("inf"):
-            raise ValueError(f"error_clip must be positive and finite, got {self.error_clip}")
-        if not 0.0 <= self.exclusion_cost < float("inf"):
-            raise ValueError(f"exclusion_cost must be 0 or more and finite, got {self.exclusion_cost}")
-        if self.threads < 1:
-            raise ValueError(f"threads must be 1 or more, got {self.threads}")
+        owner = "Defender-v0"
+        _check_coupling(owner, self.coupling)
+        validation.text(owner, "fidelity", self.fidelity)
+        scale = self.error_scale
+        _set(
+            self,
+            clean=validation.share(owner, "clean", self.clean),
+            outage=validation.share(owner, "outage", self.outage),
+            multipath=validation.share(owner, "multipath", self.multipath),
+            error_scale=None if scale is None else validation.between(owner, "error_scale", scale, *SCALES),
+            error_clip=validation.between(owner, "error_clip", self.error_clip, *SCALES),
+            exclusion_cost=validation.non_negative(owner, "exclusion_cost", self.exclusion_cost, MOST_WEIGHT),
+            threads=validation.threads(owner, self.threads),
+        )

@@ -151,7 +151,8 @@ class DefenderEnv(SingleEnv):
     recomputing past epochs does not mend what was put out then. The reward is the sum of two terms, which
     `info["reward_terms"]` holds:
 
-    - `error`: minus the error over `error_scale`, at most `error_clip`.
+    - `error`: minus the error over `error_scale`, at most `error_clip`. A filter that diverges costs `error_clip` in
+      this step and in each epoch that is left, at once.
     - `exclusion`: minus `exclusion_cost` where the decision was to exclude a clean fix: one that the receiver gives,
       not spoofed and without multipath. Where single satellites of a clean fix are left out, this times their share of
       those in view.
@@ -166,7 +167,10 @@ class DefenderEnv(SingleEnv):
 
     ## Episode End
 
-    - Terminated: at the last epoch of the scenario (230 steps on the drive). Its fix is observed, not decided on.
+    - Terminated: at the last epoch of the scenario (230 steps on the drive), whose fix is observed and not decided on,
+      or when the filter diverges. A jump of many kilometres that is used can make a filter of the strapdown fidelity
+      diverge: its solution leaves the range in which the mechanization holds (`spoofgym.navigation.divergence`). The
+      error is then that of its last valid solution, and all numbers stay finite.
     - Truncated: never by itself. `gymnasium.make(..., max_episode_steps=...)` sets a shorter limit.
 
     ## Information
@@ -183,7 +187,9 @@ class DefenderEnv(SingleEnv):
     - `satellites_left_out`: satellites in view that were left out of the last fix, if it was used (`coupling="tight"`
       only).
     - `satellites_ignored`: choices to leave out an empty slot (`coupling="tight"` only).
-    - `mean_error`: mean of the error over the game, m (last step only).
+    - `mean_error`: mean of the error over the game, m (last step only). Where the filter diverged, its last error
+      stands for the epochs that were left.
+    - `outcome`: "finished", or "diverged" where the filter diverged (last step only).
 
     For training only: `env.unwrapped.game.privileged()` gives what a critic may know and no defender (the true error
     and the schedule of the attack); it is no part of the observation.

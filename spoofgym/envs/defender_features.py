@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.envs.observation import AXES, Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
+from spoofgym.kernels import njit
 from spoofgym.responses.onset import OnsetEstimator
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -93,7 +93,7 @@ class DefenderFeatures:
         self.agreeing = np.zeros(num_lanes, dtype=np.int64)
         self._raw = np.zeros((num_lanes, len(self.fields)))
         self._quiet_nis, self._quiet_mean = quantile(QUIET_P, dimension), quantile(QUIET_P, 2)
-        self._interval, self._horizon = scenario.timeline.interval, scenario.timeline.num_epochs
+        self._timeline, self._horizon = scenario.timeline, scenario.timeline.num_epochs
         self._bias_sigma = scenario.bias_sigma
         self._squash = Squash(self.fields)
 
@@ -132,12 +132,12 @@ class DefenderFeatures:
             self.onset_depth,
             score,
             excluding,
-            np.asarray(coast * self._interval, dtype=np.float64),
+            self._coasting_time(epoch.index, coast),
             epoch.view.position_covariance,
             epoch.view.velocity,
             epoch.view.estimated_bias,
             self._bias_sigma,
-            self._interval,
+            self._timeline.intervals[np.maximum(epoch.index - 1, 0)],
             self._horizon,
             self._quiet_nis,
             self._quiet_mean,
@@ -152,6 +152,13 @@ class DefenderFeatures:
         )
         if self._ranges is not None:
             self._raw[lanes, self._common :] = self._ranges()[lanes]
+
+    def _coasting_time(self, index: Runs, coast: Runs) -> Floats:
+        """Time without a fix that was used, (N,), s, beyond the usual interval; epochs that are missing count."""
+        timeline = self._timeline
+        before = np.maximum(index - 1, 0)
+        late = np.where(index > 0, timeline.intervals[before] - timeline.interval, 0.0)
+        return timeline.between(before - coast, before) + late
 
     def observation(self) -> NDArray[np.float32]:
         """What each lane's defender sees, (N, D)."""
@@ -176,7 +183,7 @@ def _fill(
     velocity: Floats,
     bias: Floats,
     bias_sigma: Floats,
-    interval: float,
+    interval: Floats,
     horizon: int,
     quiet_nis: float,
     quiet_mean: float,
@@ -224,7 +231,7 @@ def _fill(
         row[place + 6] = 1.0 if excluding[lane] else 0.0
         row[place + 7] = coast[lane]
         row[place + 8] = np.sqrt(covariance[lane, 0, 0] + covariance[lane, 1, 1])
-        _motion(velocity[lane], last_velocity[lane], index[lane] == 0, interval, row[place + 9 : place + 11])
+        _motion(velocity[lane], last_velocity[lane], index[lane] == 0, interval[lane], row[place + 9 : place + 11])
         place += 11
         for a in range(6):
             row[place + a] = bias[lane, a] / bias_sigma[a]

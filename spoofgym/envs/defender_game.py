@@ -11,11 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks import opponents
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.envs.actions import choices
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_features import DefenderFeatures
 from spoofgym.envs.observation import observation_space
@@ -26,6 +28,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
 
+OWNER = "Defender-v0"
 USE, EXCLUDE = 0, 1
 
 
@@ -41,6 +44,7 @@ class Outcome:
         used: whether the fix was used, (N,).
         left_out: satellites in view that were left out of a fix that was used, (N,).
         ignored: choices to leave a satellite out in an empty slot, (N,).
+        diverged: whether the filter has diverged, (N,).
         terminated: the game is over, (N,).
     """
 
@@ -51,6 +55,7 @@ class Outcome:
     used: Flags
     left_out: Runs
     ignored: Runs
+    diverged: Flags
     terminated: Flags
 
     @property
@@ -88,10 +93,12 @@ class DefenderGame:
             ValueError: a part that is unknown or does not fit the scenario.
         """
         self.config = config
-        scenario = self.scenario = make_scenario(config.scenario, config.coupling)
+        with validation.argument(OWNER, "scenario"):
+            scenario = self.scenario = make_scenario(config.scenario, config.coupling)
         given = config.detectors if isinstance(config.detectors, tuple | list) else (config.detectors,)
-        # copies: an object that the caller gives to two environments must not carry memories from one to the other
-        detectors = [deepcopy(make_detector(part)) for part in given]
+        with validation.argument(OWNER, "detectors"):
+            # copies: an object that the caller gives to two environments must not carry memories between them
+            detectors = [deepcopy(make_detector(part)) for part in given]
         for detector in detectors:
             scenario.facts.require(
                 f"detector {detector.name!r}", detector.needs, "choose others: detectors=('snapshot', 'windowed:n=5')"
@@ -107,7 +114,8 @@ class DefenderGame:
             raise ValueError(f"detectors of the game are not among those beside it: {', '.join(sorted(missing))}")
         self.num_lanes = num_lanes
         self.depths: Runs = np.array(scenario.depth_table, dtype=np.int64)
-        self.attacks = opponents(config.attacks, config.clean)
+        with validation.argument(OWNER, "attacks"):
+            self.attacks = opponents(config.attacks, config.clean)
         self.confounders = Confounders(Disturbances(outage_share=config.outage, multipath_share=config.multipath))
         self.simulation = Simulation(
             scenario,
@@ -119,12 +127,15 @@ class DefenderGame:
             threads=config.threads,
             demands=Demands(excludes=True, history=max(scenario.history, int(self.depths.max()))),
             confounders=self.confounders,
+            on_divergence="hold",
         )
         self.features = DefenderFeatures(scenario, self.simulation, names, num_lanes)
         self.privileged = PrivilegedState(self.simulation, self.attacks, self.confounders, scenario.defender_scale)
         self.fields = self.features.fields
         self.observation_space = observation_space(self.fields)
         self.action_space = spaces.MultiDiscrete([2, len(self.depths)] + [2] * scenario.slots)
+        satellites = f", then {scenario.slots} times 0 or 1" if scenario.slots else ""
+        self._valid = f"[0 or 1, 0 to {len(self.depths) - 1}{satellites}]"
         self.error = np.zeros(num_lanes)
         self.coast = np.zeros(num_lanes, dtype=np.int64)
         self.excluding = np.zeros(num_lanes, dtype=bool)
@@ -165,9 +176,9 @@ class DefenderGame:
             restarting: indices of lanes.
 
         Raises:
-            ValueError: an action lies outside the action space, or the actions have the wrong shape.
+            ValueError: an action lies outside the action space or is no number, or the actions have the wrong shape.
         """
-        actions = self._check(actions)
+        actions = choices(actions, self.num_lanes, self.action_space.nvec, self._valid)
         present, chosen = self.present, actions[:, 2:] == EXCLUDE
         in_view, out = np.add.reduce(present, axis=1, dtype=np.int64), present & chosen
         left_out = np.add.reduce(out, axis=1, dtype=np.int64)
@@ -193,24 +204,13 @@ class DefenderGame:
         if restarting is not None and len(restarting):
             self._begin(restarting)
         self.features.update(self.excluding, self.coast, self._all)
-        over = self.index == self._horizon
-        return Outcome(error, exclusion, asked, taken_back, used, left_out, ignored, over)
-
-    def _check(self, actions: NDArray[Any]) -> Runs:
-        given, most = np.asarray(actions), self.action_space.nvec
-        shape = (self.num_lanes, len(most))
-        if given.shape != shape:
-            raise ValueError(f"actions must have shape {shape}, got {given.shape}")
-        whole = given.astype(np.int64)
-        wrong = (whole != given) | (whole < 0) | (whole >= most)
-        if wrong.any():
-            lane = int(np.flatnonzero(wrong.any(axis=1))[0])
-            satellites = f", then {len(most) - 2} times 0 or 1" if len(most) > 2 else ""
-            raise ValueError(
-                f"action of lane {lane} must be whole numbers, [0 or 1, 0 to {len(self.depths) - 1}{satellites}], "
-                f"got {given[lane]}"
-            )
-        return whole
+        diverged = simulation.navigator.diverged.copy()
+        if diverged.any():
+            left = np.where(diverged, self._horizon - self.index, 0)
+            self._total_error += left * self.error
+            error = np.where(diverged, -self.config.error_clip * (left + 1), error)
+        over = diverged | (self.index == self._horizon)
+        return Outcome(error, exclusion, asked, taken_back, used, left_out, ignored, diverged, over)
 
     @property
     def present(self) -> Flags:
@@ -269,4 +269,5 @@ class DefenderGame:
 
     def end_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos of games that are over."""
-        return {"mean_error": self._total_error / self._horizon}
+        words = np.where(outcome.diverged, "diverged", "finished").astype(object)
+        return {"mean_error": self._total_error / self._horizon, "outcome": words}

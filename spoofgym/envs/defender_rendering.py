@@ -124,7 +124,7 @@ class DefenderFigure:
                 linewidth=0,
             )
             if depth:
-                begin, end, height = rows[place, 0], rows[place, 0] - depth * interval, next(heights)
+                begin, end, height = rows[place, 0], rows[max(place - depth, 0), 0], next(heights)
                 axes.annotate("", (end, height), (begin, height), arrowprops={"arrowstyle": "->", "color": "black"})
                 axes.text(end - interval, height, f"{depth} back", va="center", ha="right", fontsize=8)
         axes.set(yticks=[], ylim=(0, 1))

@@ -12,9 +12,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.envs.config import configure
+from spoofgym.envs.config import check_options, configure
 from spoofgym.simulation import Simulation
+
+MOST_LANES = 100_000
 
 Observations = NDArray[np.float32]
 Values = dict[str, Any]
@@ -103,16 +106,22 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         Raises:
             ValueError: an argument out of range, or a render mode, which only the single environment has.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs must be 1 or more, got {num_envs}")
+        owner = type(self).__name__
+        num_envs = validation.whole(owner, "num_envs", num_envs, 1, MOST_LANES)
         if render_mode is not None:
-            raise ValueError(f"the vector environment draws nothing: render_mode must be None, got {render_mode!r}")
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps must be 1 or more, got {max_episode_steps}")
+            raise ValueError(
+                f"{owner}: render_mode must be None, because the vector environment draws nothing, got "
+                f"{validation.shown(render_mode)}"
+            )
+        if max_episode_steps is not None:
+            max_episode_steps = validation.whole(owner, "max_episode_steps", max_episode_steps, 1)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            modes = tuple(mode.value for mode in AutoresetMode)
+            autoreset_mode = AutoresetMode(validation.one_of(owner, "autoreset_mode", autoreset_mode, modes))
         self.num_envs = num_envs
         self.config: Any = configure(self.config_type, arguments)
         self.game: Any = type(self).game_type(self.config, num_envs)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = autoreset_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = None
         self.single_observation_space = self.game.observation_space
@@ -135,18 +144,21 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             options: ``{"reset_mask": bool (N,)}`` resets those lanes only.
 
         Raises:
-            ValueError: a sequence of seeds of the wrong length, or a mask of the wrong shape or without any lane.
-            TypeError: a mask that is not a boolean array.
+            ValueError: a seed that is no integer or negative, a sequence of them of the wrong length, an unknown
+                option, or a mask of the wrong shape or without any lane.
+            TypeError: options that are no dictionary, or a mask that is not a boolean array.
         """
         mask = self._reset_mask(options)
         lanes = np.flatnonzero(mask)
         seeds: Sequence[int | None]
-        if seed is None or isinstance(seed, int | np.integer):
-            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
+        owner = type(self).__name__
+        if isinstance(seed, list | tuple | range) or (isinstance(seed, np.ndarray) and seed.ndim == 1):
+            seeds = [validation.seed(owner, item) for item in seed]
         else:
-            seeds = list(seed)
+            first = validation.seed(owner, seed)
+            seeds = [None if first is None else first + i for i in range(self.num_envs)]
         if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number or {self.num_envs} of them, got {len(seeds)}")
+            raise ValueError(f"{owner}: seed must be one number or {self.num_envs} of them, got {len(seeds)}")
         for lane in lanes:
             if seeds[lane] is not None or self._generators[lane] is None:
                 generator, _ = seeding.np_random(seeds[lane])
@@ -158,14 +170,16 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         return self.game.observation(), self._reset_info(mask)
 
     def _reset_mask(self, options: dict[str, Any] | None) -> Flags:
-        if options is None or "reset_mask" not in options:
+        check_options(type(self).__name__, options, ("reset_mask",))
+        if not options:
             return np.ones(self.num_envs, dtype=bool)
         mask = options["reset_mask"]
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-            raise TypeError(f"options['reset_mask'] must be a boolean array, got {mask!r}")
+            raise TypeError(f"options['reset_mask'] must be a boolean array, got {validation.shown(mask)}")
         if mask.shape != (self.num_envs,) or not mask.any():
             raise ValueError(
-                f"options['reset_mask'] must have shape ({self.num_envs},) and at least one True, got {mask!r}"
+                f"options['reset_mask'] must have shape ({self.num_envs},) and at least one True, got "
+                f"{validation.shown(mask)}"
             )
         return mask
 

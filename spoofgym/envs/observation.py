@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 AXES = ("east", "north", "up")
 

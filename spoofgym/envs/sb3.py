@@ -9,6 +9,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from spoofgym import validation
+from spoofgym.envs.config import check_options
+
 try:
     from stable_baselines3.common.vec_env import VecEnv
     from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
@@ -34,7 +37,9 @@ class SB3VecEnv(VecEnv):
 
         Raises:
             ValueError: its autoreset mode is not SAME_STEP, whose observations Stable-Baselines3 expects.
+            TypeError: it is no Gymnasium vector environment.
         """
+        validation.instance("SB3VecEnv", "vector_env", vector_env, VectorEnv, "a Gymnasium vector environment")
         mode = vector_env.metadata.get("autoreset_mode")
         if mode != AutoresetMode.SAME_STEP:
             raise ValueError(f"the vector environment must have autoreset_mode={AutoresetMode.SAME_STEP}, got {mode}")
@@ -43,7 +48,13 @@ class SB3VecEnv(VecEnv):
         super().__init__(vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space)
 
     def reset(self) -> VecEnvObs:
-        """Start new episodes in all lanes; seeds given by `seed` are used once."""
+        """Start new episodes in all lanes; seeds given by `seed` are used once.
+
+        Raises:
+            ValueError: `set_options` has given an option: there are none.
+        """
+        for options in self._options:
+            check_options("SB3VecEnv", options)
         seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
         observation, info = self.vector_env.reset(seed=seeds)  # type: ignore[arg-type]
         self.reset_infos = [_lane(info, lane) for lane in range(self.num_envs)]

@@ -9,9 +9,9 @@ alone,
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel

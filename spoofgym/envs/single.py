@@ -8,6 +8,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from spoofgym import validation
+from spoofgym.envs.actions import as_numbers
+from spoofgym.envs.config import check_options
 from spoofgym.envs.native import Game, Values
 
 LANE = np.zeros(1, dtype=np.int64)
@@ -46,14 +49,20 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
 
     @classmethod
     def _check_render_mode(cls, render_mode: str | None) -> None:
-        if render_mode is not None and render_mode not in cls.metadata["render_modes"]:
-            raise ValueError(f"unknown render_mode {render_mode!r}; valid modes: {cls.metadata['render_modes']}")
+        if render_mode is not None:
+            validation.one_of(cls.__name__, "render_mode", render_mode, tuple(cls.metadata["render_modes"]))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start a new game; there are no options."""
-        super().reset(seed=seed)
+        """Start a new game; there are no options.
+
+        Raises:
+            ValueError: a seed that is no integer or negative, or an option.
+            TypeError: options that are no dictionary.
+        """
+        check_options(type(self).__name__, options)
+        super().reset(seed=validation.seed(type(self).__name__, seed))
         if self.np_random is not self._streamed:
             self.game.simulation.streams.replace(0, self.np_random)
             self._streamed = self.np_random
@@ -67,15 +76,13 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
         """One GNSS epoch.
 
         Raises:
-            ValueError: the action has the wrong shape, or lies outside the action space where that is discrete.
+            ValueError: the action is none of finite numbers, has the wrong shape, or lies outside the action space
+                where that is discrete.
             RuntimeError: the game is over or has not been started.
         """
         if not self._playing:
             raise RuntimeError("the game is over: call reset() first")
-        action = np.asarray(action)
-        if action.shape != self.action_space.shape:
-            raise ValueError(f"the action must have shape {self.action_space.shape}, got {action.shape}")
-        outcome = self.game.step(action[None])
+        outcome = self.game.step(as_numbers("the action", action, self.action_space.shape)[None])
         terminated = bool(outcome.terminated[0])
         self._playing = not terminated
         if self._figure is not None:

@@ -121,7 +121,7 @@ class SpooferEnv(SingleEnv):
     - `growth`: growth of the error since the last step, over the scenario's `error_scale` (10 m on the Liu flight). A
       step resolves the fix of the epoch before; the last step of an undetected game resolves its own, too.
     - `forfeit`: at an alarm that ends the game, minus `forfeit` times all growth so far, that of this step included;
-      else 0.
+      else 0. With `on_alarm="end"` a filter that diverges counts as an alarm.
 
     So with `forfeit=1.0` the return times `error_scale` is the error at the end minus that at the start if
     undetected, and 0 if detected.
@@ -135,7 +135,10 @@ class SpooferEnv(SingleEnv):
 
     ## Episode End
 
-    - Terminated: an alarm (with `on_alarm="end"`), or the last epoch of the scenario (120 steps on the Liu flight).
+    - Terminated: an alarm (with `on_alarm="end"`), the last epoch of the scenario (120 steps on the Liu flight), or a
+      filter that diverges. A jump of many kilometres can make a filter of the strapdown fidelity diverge: its solution
+      leaves the range in which the mechanization holds (`spoofgym.navigation.divergence`). The error is then that of
+      its last valid solution, and all numbers stay finite.
     - Truncated: never by itself. `gymnasium.make(..., max_episode_steps=...)` sets a shorter limit.
 
     ## Information
@@ -148,9 +151,9 @@ class SpooferEnv(SingleEnv):
       only): variance that the tracking error adds to what the CPI of Kujur et al. (2024) sums, over that which it has;
       1 / σ_s is the sigma of the position that the innovation asks for. Where κ is far below 1 the CPI has no power.
     - `clock_error`: estimate minus truth of the receiver's clock when last resolved, m (`coupling="tight"` only).
-    - `outcome`: "detected" if any alarm was raised in the game, else "undetected" (last step of a terminated game
-      only).
-    - `is_success`: whether undetected (with `outcome` only).
+    - `outcome`: "diverged" if the filter diverged, "detected" if any alarm was raised in the game, else "undetected"
+      (last step of a terminated game only).
+    - `is_success`: whether "undetected" (with `outcome` only).
 
     ## Arguments
 

@@ -11,11 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.cpi_theory import kappa
+from spoofgym.envs.actions import rates
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
 from spoofgym.envs.observation import AXES, Squash, observation_space, spoofer_fields
@@ -29,6 +31,9 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 
+OWNER = "Spoofer-v0"
+MOST_ENTRIES = 2**28
+"""Of the observations of all lanes: a gigabyte."""
 INNOVATION_UNIT = 4.0
 """One unit of the innovation action, in sigma per axis."""
 
@@ -39,9 +44,10 @@ class Outcome:
 
     Attributes:
         growth: reward for the growth of the error, (N,).
-        forfeit: what an alarm takes back, (N,).
+        forfeit: what an alarm, or a filter that diverges, takes back, (N,).
         alarm: whether a detector alarmed in this epoch of the game, (N,).
         alarmed: whether one has alarmed since the game began, (N,).
+        diverged: whether the victim's filter has diverged, (N,).
         terminated: the game is over, (N,).
     """
 
@@ -49,6 +55,7 @@ class Outcome:
     forfeit: Floats
     alarm: Flags
     alarmed: Flags
+    diverged: Flags
     terminated: Flags
 
     @property
@@ -77,7 +84,8 @@ class SpooferGame:
             ValueError: a part that is unknown or does not fit the scenario.
         """
         self.config = config
-        scenario = make_scenario(config.scenario, config.coupling)
+        with validation.argument(OWNER, "scenario"):
+            scenario = make_scenario(config.scenario, config.coupling)
         self._ranges = scenario.coupling == "tight"
         if self._ranges and config.action == "innovation":
             raise ValueError(
@@ -85,26 +93,41 @@ class SpooferGame:
                 "offset provokes any innovation of the ranges; use action='rate'"
             )
         given = config.detector if isinstance(config.detector, tuple | list) else (config.detector,)
-        # copies: an object that the caller gives to two environments must not carry memories from one to the other
-        detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
+        with validation.argument(OWNER, "detector"):
+            # copies: an object that the caller gives to two environments must not carry memories between them
+            detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
         names = [detector.name for detector in detectors]
         if len(set(names)) < len(names):
             raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
-        response: Response | None = deepcopy(make_response(config.response))
+        with validation.argument(OWNER, "response"):
+            response: Response | None = deepcopy(make_response(config.response))
         if config.on_alarm == "end":
             response = None
         self.simulation = Simulation(
-            scenario, None, detectors, response, num_lanes, fidelity=config.fidelity, threads=config.threads
+            scenario,
+            None,
+            detectors,
+            response,
+            num_lanes,
+            fidelity=config.fidelity,
+            threads=config.threads,
+            on_divergence="hold",
         )
         self.scenario = scenario
         self.num_lanes = num_lanes
         self.shadow: ShadowFilter | TightShadowFilter | None = None
         if config.knowledge != "blind":
-            believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
-            self.shadow = self._shadow_filter(believed)
+            with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):
+                believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
+                self.shadow = self._shadow_filter(believed)
         dimension = 3 if self._ranges else scenario.dimension
         fields = spoofer_fields(config.knowledge, dimension, tuple(self.simulation.detectors), self._ranges)
         self.fields = stacked_fields(fields, config.frames)
+        if num_lanes * len(self.fields) > MOST_ENTRIES:
+            raise ValueError(
+                f"{OWNER}: frames times num_envs must leave {MOST_ENTRIES} entries of observations at most, got frames="
+                f"{config.frames} with num_envs={num_lanes}"
+            )
         self.observation_space = observation_space(self.fields)
         rates = (*scenario.drag_off_rate, scenario.clock_rate) if self._ranges else scenario.drag_off_rate
         self.action_space = spaces.Box(-1.0, 1.0, (len(rates),), np.float32)
@@ -115,9 +138,9 @@ class SpooferGame:
         self._start_error = np.zeros(num_lanes)
         self.offset = np.zeros((num_lanes, len(rates)))
         self._velocity = scenario.velocity()
-        self._rate = np.array(rates) * scenario.timeline.interval
-        self._horizon = scenario.timeline.num_epochs
-        self._interval = scenario.timeline.interval
+        timeline = scenario.timeline
+        self._horizon, self._interval, self._intervals = timeline.num_epochs, timeline.interval, timeline.intervals
+        self._reach = np.array(rates) * self._intervals[:, None]
         self._tracking_sigma = np.full((num_lanes, 1), config.tracking_sigma)
         self._all = np.arange(num_lanes)
         self._tracking = np.zeros((num_lanes, self._horizon + 1, 6))
@@ -154,7 +177,7 @@ class SpooferGame:
             sigma, time, shape = self.config.tracking_sigma, self.config.tracking_time, self._tracking.shape[1:]
             for lane in lanes:
                 stream = self.simulation.streams(lane, "tracking")
-                self._tracking[lane] = draw_tracking_error(stream, shape, sigma, time, self._interval)
+                self._tracking[lane] = draw_tracking_error(stream, shape, sigma, time, self._intervals)
         if self.shadow is not None:
             self.shadow.reset(lanes)
 
@@ -175,14 +198,9 @@ class SpooferGame:
             restarting: indices of lanes.
 
         Raises:
-            ValueError: an action is NaN or infinite, or has the wrong shape.
+            ValueError: an action is not finite or no number, or the actions have the wrong shape.
         """
-        actions = np.asarray(actions, dtype=np.float64)
-        if actions.shape != self.offset.shape:
-            raise ValueError(f"actions must have shape {self.offset.shape}, got {actions.shape}")
-        if not np.isfinite(actions).all():
-            lane = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
-            raise ValueError(f"action of lane {lane} is not finite: {actions[lane]}")
+        actions = rates(actions, self.offset.shape)
         simulation = self.simulation
         simulation.resolve()
         error = self._horizontal()
@@ -215,7 +233,7 @@ class SpooferGame:
     def _intend(self, actions: Floats, previous: Floats) -> Floats:
         """The offset that the spoofer means to send, (N, 3) or (N, 4), m ENU and m."""
         if self.config.action == "rate":
-            return previous + actions * self._rate
+            return previous + actions * self._reach[np.minimum(self.index, self._horizon - 1)]
         assert isinstance(self.shadow, ShadowFilter)
         following = np.minimum(self.index + 1, self._horizon)
         return self.shadow.offset_for(following, INNOVATION_UNIT * actions)
@@ -226,17 +244,20 @@ class SpooferGame:
         alarm = self.simulation.alarm & (index > 0)
         self._alarmed = self._alarmed | alarm
         caught = alarm if self.config.on_alarm == "end" else self._nobody
-        last = (index == self._horizon) & ~caught
+        diverged = self.simulation.navigator.diverged
+        last = (index == self._horizon) & ~caught & ~diverged
         if last.any():
             lanes = np.flatnonzero(last)
             self.simulation.resolve(runs=lanes)
             error[lanes] = self._horizontal()[lanes]
             self._read_clock(lanes)
         scale = self.scenario.error_scale
+        diverged = diverged.copy()  # the last fix of a game, too, can make its filter diverge
+        lost = caught | diverged if self.config.on_alarm == "end" else self._nobody
         growth = (error - self.error) / scale
-        forfeit = np.where(caught, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
+        forfeit = np.where(lost, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
         self.error = error
-        return Outcome(growth, forfeit, alarm, self._alarmed, caught | last)
+        return Outcome(growth, forfeit, alarm, self._alarmed, diverged, caught | last | diverged)
 
     def observation(self) -> NDArray[np.float32]:
         """What each lane's spoofer sees, (N, frames * D)."""
@@ -291,4 +312,5 @@ class SpooferGame:
     def end_values(self, outcome: Outcome) -> dict[str, Any]:
         """Infos of games that are over."""
         words = np.where(outcome.alarmed, "detected", "undetected").astype(object)
-        return {"outcome": words, "is_success": ~outcome.alarmed}
+        words[outcome.diverged] = "diverged"
+        return {"outcome": words, "is_success": ~outcome.alarmed & ~outcome.diverged}

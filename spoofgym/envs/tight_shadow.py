@@ -13,9 +13,9 @@ the position domain (Kujur 2024, eqs 17-20).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman, tight_filter
 from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.position_domain import project_onto_position

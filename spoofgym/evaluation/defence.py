@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,8 +15,8 @@ from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
-from spoofgym.evaluation.monte_carlo import horizontal
-from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.evaluation.monte_carlo import batches, horizontal
+from spoofgym.navigation.interface import Decision, Demands, Timeline
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching
 from spoofgym.scenario import Scenario
@@ -39,7 +39,7 @@ class DefenceEpisodes:
         clean: there was a fix, neither spoofed nor disturbed by multipath, (n, K).
         member: the opponent, an index into ``names``, (n,); -1 = none.
         names: of the opponents.
-        interval: between epochs, s.
+        timeline: of the games.
     """
 
     error: Floats
@@ -49,7 +49,7 @@ class DefenceEpisodes:
     clean: Flags
     member: Runs
     names: tuple[str, ...]
-    interval: float
+    timeline: Timeline
 
     def of(self, games: Any) -> DefenceEpisodes:
         """Some of the games."""
@@ -98,14 +98,6 @@ class World:
             demands=demands,
             confounders=Confounders(self.disturbances),
         )
-
-
-def _batches(episodes: int) -> Iterator[tuple[int, int]]:
-    """First episode and number of episodes of each batch."""
-    if episodes < 1:
-        raise ValueError(f"episodes must be 1 or more, got {episodes}")
-    for first in range(0, episodes, BATCH):
-        yield first, min(BATCH, episodes - first)
 
 
 def play_response(world: World, detector: str, response: Response, episodes: int, seed: int) -> DefenceEpisodes:
@@ -191,8 +183,8 @@ def _play(
     seed: int,
 ) -> DefenceEpisodes:
     parts = []
-    for first, count in _batches(episodes):
-        simulation = world.simulation(response, count, seed + first, demands)
+    for first, count in batches(episodes, seed, BATCH):
+        simulation = world.simulation(response, count, first, demands)
         simulation.reset()
         record = _Record(simulation)
         for k in range(world.scenario.timeline.num_epochs):
@@ -230,10 +222,10 @@ def play_policy(
         threads=world.threads,
     )
     parts = []
-    for first, count in _batches(episodes):
+    for first, count in batches(episodes, seed, BATCH):
         game = DefenderGame(config, count, world.detectors)
         game.confounders.disturbances = world.disturbances
-        game.simulation.streams = RunStreams.from_seed(seed + first, count)
+        game.simulation.streams = RunStreams.from_seed(first, count)
         game.reset(np.arange(count))
         record = _Record(game.simulation)
         for k in range(world.scenario.timeline.num_epochs):
@@ -241,6 +233,7 @@ def play_policy(
             actions = act(game.observation())
             record.excluded[:, k] = actions[:, 0] == EXCLUDE
             game.step(actions)
+            game.simulation.require_converged()
             record.error[:, k] = game.error
         parts.append(record.episodes(game.simulation))
     return _join(parts)
@@ -275,7 +268,7 @@ class _Record:
             clean,
             attack.member.copy(),
             tuple(attack.names),
-            simulation.scenario.timeline.interval,
+            simulation.scenario.timeline,
         )
 
 

@@ -61,8 +61,12 @@ def defender_score(episodes: DefenceEpisodes) -> DefenderScore:
     excluded = episodes.excluded & episodes.available
     detected = first_exclusion(episodes)
     spoofed = episodes.attacked.any(axis=1)
-    found = detected[spoofed & (detected != NEVER)]
+    found = np.flatnonzero(spoofed & (detected != NEVER))
+    begun = onset(episodes)[found]
     reuse, ends = time_to_reuse(episodes)
+    again = np.flatnonzero(ends & (reuse != NEVER))
+    over = last_spoofed(episodes)[again] + 1
+    between = episodes.timeline.between
     return DefenderScore(
         episodes=len(per_game),
         mean_error=float(per_game.mean()),
@@ -70,9 +74,9 @@ def defender_score(episodes: DefenceEpisodes) -> DefenderScore:
         rmse=math.sqrt(float((episodes.error**2)[stretch].mean())),
         max_error=float(np.where(stretch, episodes.error, 0.0).max(axis=1).mean()),
         detection_probability=float((detected[spoofed] != NEVER).mean()) if spoofed.any() else None,
-        median_time_to_detect=_censored_median(found, int(spoofed.sum()), episodes.interval),
+        median_time_to_detect=_censored_median(between(begun, begun + detected[found]), int(spoofed.sum())),
         error_at_detection=_error_at_detection(episodes, detected),
-        median_time_to_reuse=_censored_median(reuse[ends & (reuse != NEVER)], int(ends.sum()), episodes.interval),
+        median_time_to_reuse=_censored_median(between(over, over + reuse[again]), int(ends.sum())),
         never_reused=float((reuse[ends] == NEVER).mean()) if ends.any() else None,
         clean_exclusion=float(excluded[episodes.clean].mean()) if episodes.clean.any() else 0.0,
         false_alarms=false_alarm_rate(episodes),
@@ -83,6 +87,11 @@ def onset(episodes: DefenceEpisodes) -> Runs:
     """First spoofed epoch of each game, (n,); K where there is none."""
     spoofed = episodes.attacked
     return np.where(spoofed.any(axis=1), spoofed.argmax(axis=1), spoofed.shape[1])
+
+
+def last_spoofed(episodes: DefenceEpisodes) -> Runs:
+    """Last spoofed epoch of each game, (n,); K - 1 where there is none."""
+    return np.asarray(episodes.attacked.shape[1] - 1 - episodes.attacked[:, ::-1].argmax(axis=1))
 
 
 def _from_onset(episodes: DefenceEpisodes) -> Flags:
@@ -114,7 +123,7 @@ def time_to_reuse(episodes: DefenceEpisodes) -> tuple[Runs, Flags]:
         Epochs (n,), -1 = never; whether the attack ends in the game, (n,).
     """
     count, epochs = episodes.attacked.shape
-    last = epochs - 1 - episodes.attacked[:, ::-1].argmax(axis=1)
+    last = last_spoofed(episodes)
     ends = episodes.attacked.any(axis=1) & (last < epochs - 1)
     excluded = episodes.excluded & episodes.available
     # fixes excluded from each epoch on, over the next STEADY epochs
@@ -143,12 +152,12 @@ def _excluded_before(episodes: DefenceEpisodes) -> Flags:
     return before
 
 
-def _censored_median(times: Runs, cases: int, interval: float) -> float | None:
-    """Time by which half of all cases have come, s; those that are missing never did."""
+def _censored_median(times: Floats, cases: int) -> float | None:
+    """The time, s, by which half of all cases have come; those that are missing never did."""
     needed = (cases + 1) // 2
     if cases == 0 or len(times) < needed:
         return None
-    return float(np.sort(times)[needed - 1]) * interval
+    return float(np.sort(times)[needed - 1])
 
 
 @dataclass(frozen=True)

@@ -140,12 +140,12 @@ def _play(replica: Replica, runs: int, seed: int, horizon: int, p_md: float) -> 
 
 def offsets(replica: Replica, simulation: Simulation, horizon: int) -> Floats:
     """What the spoofer adds at the epochs 1 to K, (K, N, 3), m ENU."""
-    interval = simulation.scenario.timeline.interval
+    intervals = simulation.scenario.timeline.intervals
     offset = np.zeros((horizon, simulation.num_runs, 3))
     for run in range(simulation.num_runs):
         stream = simulation.streams(run, "tracking")
-        offset[:, run, UP] = draw_tracking_error(stream, (horizon,), replica.sigma, replica.time, interval)
-    offset[:, :, UP] += replica.rate * interval * np.arange(1, horizon + 1)[:, None]
+        offset[:, run, UP] = draw_tracking_error(stream, (horizon,), replica.sigma, replica.time, intervals[1:])
+    offset[:, :, UP] += replica.rate * np.cumsum(intervals)[:, None]
     return offset
 
 

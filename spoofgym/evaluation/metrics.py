@@ -52,8 +52,9 @@ def median_time_to_detect(episodes: Episodes) -> float | None:
     """Kaplan-Meier median, s: undetected games are censored at the end, so it is when half of all have alarmed."""
     n = len(episodes.alarm_epoch)
     needed = (n + 1) // 2
-    times = np.sort((episodes.alarm_epoch - episodes.onset_epoch)[episodes.detected])
-    return float(times[needed - 1]) * episodes.interval if len(times) >= needed else None
+    found = episodes.detected
+    times = np.sort(episodes.timeline.between(episodes.onset_epoch[found], episodes.alarm_epoch[found]))
+    return float(times[needed - 1]) if len(times) >= needed else None
 
 
 def attacker_score(episodes: Episodes) -> AttackerScore:

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.navigation.interface import Timeline
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
@@ -31,14 +33,14 @@ class Episodes:
         alarm_error: horizontal error of the estimate at the first alarm, (n,), m; of no meaning where there was none.
         final_error: horizontal error after the last fix was used, (n,), m.
         onset_epoch: the last one before the attack, (n,); 0 where there is none.
-        interval: between epochs, s.
+        timeline: of the games.
     """
 
     alarm_epoch: Runs
     alarm_error: Floats
     final_error: Floats
     onset_epoch: Runs
-    interval: float
+    timeline: Timeline
 
     @property
     def detected(self) -> NDArray[np.bool_]:
@@ -56,7 +58,7 @@ class WatchedEpisodes:
         peak: highest statistic over its threshold from the attack on, (D, n); in epochs 1..K where there is none.
         final_error: horizontal error after the last fix was used, (n,), m.
         onset_epoch: the last one before the attack, (n,); 0 where there is none.
-        interval: between epochs, s.
+        timeline: of the games.
     """
 
     alarm_epoch: Runs
@@ -64,22 +66,22 @@ class WatchedEpisodes:
     peak: Floats
     final_error: Floats
     onset_epoch: Runs
-    interval: float
+    timeline: Timeline
 
     def of(self, detector: int) -> Episodes:
         """As one detector, by its place, saw them."""
         alarm_epoch, alarm_error = self.alarm_epoch[detector], self.alarm_error[detector]
-        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.interval)
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
 
     def together(self) -> Episodes:
         """As all detectors at once: the first alarm of any."""
         n = len(self.final_error)
         if not len(self.alarm_epoch):
-            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.onset_epoch, self.interval)
+            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.onset_epoch, self.timeline)
         epoch = np.where(self.alarm_epoch == NEVER, np.iinfo(np.int64).max, self.alarm_epoch)
         first, runs = epoch.argmin(axis=0), np.arange(n)
         alarm_epoch, alarm_error = self.alarm_epoch[first, runs], self.alarm_error[first, runs]
-        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.interval)
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
 
 
 def horizontal(error: Floats) -> Floats:
@@ -87,12 +89,21 @@ def horizontal(error: Floats) -> Floats:
     return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
 
 
-def _batches(episodes: int) -> Iterator[tuple[int, int]]:
-    """First run and number of runs of each batch."""
-    if episodes < 1:
-        raise ValueError(f"episodes must be 1 or more, got {episodes}")
-    for first in range(0, episodes, BATCH):
-        yield first, min(BATCH, episodes - first)
+def batches(episodes: int, seed: int, size: int) -> Iterator[tuple[int, int]]:
+    """Seed of the first game and number of games of each batch.
+
+    Args:
+        episodes: games of all batches.
+        seed: of the first game of all.
+        size: games of a batch.
+
+    Raises:
+        ValueError: no games, or too many, or a seed that is no whole number, 0 or more.
+    """
+    episodes = validation.runs("evaluation", "episodes", episodes)
+    seed = validation.whole("evaluation", "seed", seed, 0, 2**62)
+    for first in range(0, episodes, size):
+        yield seed + first, min(size, episodes - first)
 
 
 class _Watch:
@@ -127,6 +138,7 @@ def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch
     begun, onset_epoch = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64)
     for epoch in range(1, simulation.scenario.timeline.num_epochs + 1):
         advance()
+        simulation.require_converged()
         begins = ~begun & simulation.attacked
         if begins.any():
             onset_epoch[begins] = epoch - 1
@@ -140,8 +152,8 @@ def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch
 
 
 def _watched(simulation: Simulation, watch: _Watch, onset_epoch: Runs, final_error: Floats) -> WatchedEpisodes:
-    interval = simulation.scenario.timeline.interval
-    return WatchedEpisodes(watch.alarm_epoch, watch.alarm_error, watch.peak, final_error, onset_epoch, interval)
+    timeline = simulation.scenario.timeline
+    return WatchedEpisodes(watch.alarm_epoch, watch.alarm_error, watch.peak, final_error, onset_epoch, timeline)
 
 
 def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
@@ -151,7 +163,7 @@ def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
         np.concatenate([part.peak for part in parts], axis=1),
         np.concatenate([part.final_error for part in parts]),
         np.concatenate([part.onset_epoch for part in parts]),
-        parts[0].interval,
+        parts[0].timeline,
     )
 
 
@@ -171,9 +183,9 @@ def watch_attack(
         ValueError: no episodes, or what `Simulation` refuses.
     """
     parts = []
-    for first, count in _batches(episodes):
+    for first, count in batches(episodes, seed, BATCH):
         simulation = Simulation(
-            scenario, attack, detectors, None, count, seed + first, fidelity=fidelity, threads=threads
+            scenario, attack, detectors, None, count, first, fidelity=fidelity, threads=threads
         )
         simulation.reset()
 
@@ -218,9 +230,9 @@ def watch_policy(
         seed: of game 0.
     """
     parts = []
-    for first, count in _batches(episodes):
+    for first, count in batches(episodes, seed, BATCH):
         game = make_game(count)
-        game.simulation.streams = RunStreams.from_seed(seed + first, count)
+        game.simulation.streams = RunStreams.from_seed(first, count)
         game.reset(np.arange(count))
 
         def advance(game: SpooferGame = game) -> None:

@@ -70,7 +70,7 @@ class PatientSpoofer(Attack):
         self.patience = validation.non_negative(self.kind, "patience", patience)
         self.rate = validation.non_negative(self.kind, "rate", rate)
         self.direction = validation.finite(self.kind, "direction", direction)
-        self.onset = None if onset is None else validation.finite(self.kind, "onset", onset)
+        self.onset = None if onset is None else validation.time(self.kind, "onset", onset)
 
     @property
     def name(self) -> str:

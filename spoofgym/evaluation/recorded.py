@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
@@ -15,6 +14,7 @@ from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.geodesy import position_difference
+from spoofgym.kernels import njit
 from spoofgym.navigation.mechanization import mechanize
 from spoofgym.scenarios.log import interpolate
 from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario

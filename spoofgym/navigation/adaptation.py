@@ -19,10 +19,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 
 GUARDS = ("none", "hold", "non-cumulative", "clipped", "lagged", "frozen", "bounded", "all")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import enu_difference, enu_displacement
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
-from spoofgym.navigation.mechanization import mechanize
+from spoofgym.navigation.mechanization import load_matrix, mechanize, product, rotation, transpose
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
 
 # rows of the state kept when a fix is taken
@@ -35,7 +35,8 @@ def propagate(
     angular_rate: Floats,
     specific_force: Floats,
     step: Floats,
-    boundaries: Runs,
+    bounds: Runs,
+    places: Runs,
     latency_samples: int,
     filter_density: Floats,
     process_scale: Floats,
@@ -44,7 +45,7 @@ def propagate(
     instability_decay: float,
     auxiliary: Floats,
 ) -> None:
-    """Carry runs over one epoch: mechanization, covariance, and the state kept when the fix is taken.
+    """Carry runs over one epoch, part by part: mechanization, covariance, and the state kept when the fix is taken.
 
     Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (N, B, W) hold the noise of B epochs
     in a ring, W = 6 samples + 9 of the epoch, or 0 where the samples have errors of their own. The unaided solution
@@ -60,29 +61,34 @@ def propagate(
         noise = normals[run, index[run] % normals.shape[1]]
         for a in range(6):
             residual_bias[a] = true_bias[run, a] - bias[run, a]
-        interval = mechanize_epoch(
-            boundaries[index[run]],
-            boundaries[index[run] + 1],
-            latency_samples,
-            residual_bias,
-            noise,
-            angular_rate,
-            specific_force,
-            step,
-            true_noise,
-            attitude[run],
-            velocity[run],
-            position[run],
-            fix[run],
-            mean_force,
-            transition,
-        )
-        for i in range(NUM_STATES):
-            half_noise[i, i] = 0.5 * interval * filter_density[i] * process_scale[run]
-            covariance[run, i, i] += half_noise[i, i]
-        kalman.predict_covariance(transition, half_noise, covariance[run], product)
-        if auxiliary.shape[1] > 0:
-            kalman.predict_mean(transition, auxiliary[run], mean)
+        begin, end = places[index[run]], places[index[run] + 1]
+        start, interval = bounds[begin], 0.0
+        taken = bounds[end] - latency_samples
+        for part in range(begin, end):
+            length = mechanize_part(
+                bounds[part],
+                bounds[part + 1],
+                taken,
+                residual_bias,
+                noise[NUM_SAMPLE_NOISES * (bounds[part] - start) :],
+                angular_rate,
+                specific_force,
+                step,
+                true_noise,
+                attitude[run],
+                velocity[run],
+                position[run],
+                fix[run],
+                mean_force,
+                transition,
+            )
+            for i in range(NUM_STATES):
+                half_noise[i, i] = 0.5 * length * filter_density[i] * process_scale[run]
+                covariance[run, i, i] += half_noise[i, i]
+            kalman.predict_covariance(transition, half_noise, covariance[run], product)
+            if auxiliary.shape[1] > 0:
+                kalman.predict_mean(transition, auxiliary[run], mean)
+            interval += length
         if noisy:
             disturb_position(position[run], true_noise, np.sqrt(interval), noise[last:])
             _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, noise[last:])
@@ -93,10 +99,10 @@ def propagate(
 
 
 @njit(cache=True, nogil=True)
-def mechanize_epoch(
+def mechanize_part(
     start: int,
     stop: int,
-    latency_samples: int,
+    taken: int,
     residual_bias: Floats,
     noise: Floats,
     angular_rate: Floats,
@@ -110,14 +116,14 @@ def mechanize_epoch(
     mean_force: Floats,
     transition: Floats,
 ) -> float:
-    """Mechanize the inertial samples of an epoch of one run, and form the transition of its error over it.
+    """Mechanize the inertial samples of a part of an epoch of one run, and form the transition of its error over it.
 
     Args:
         start: first sample.
         stop: the sample after the last.
-        latency_samples: before the end, when the fix is taken; 0 = not here.
+        taken: sample before which the fix is taken; it need not be one of these.
         residual_bias: what is left of the biases, (6,).
-        noise: normals of the epoch, six per sample first; (0,) where the samples have errors of their own.
+        noise: normals, six per sample first; (0,) where the samples have errors of their own.
         angular_rate: of the true motion, (samples, 3).
         specific_force: likewise.
         step: of each sample, s.
@@ -130,7 +136,7 @@ def mechanize_epoch(
         transition: first nine rows of Φ, (9, 15), overwritten.
 
     Returns:
-        The length of the epoch, s.
+        The length of the part, s.
     """
     rate, force = np.empty(3), np.empty(3)
     middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
@@ -144,7 +150,7 @@ def mechanize_epoch(
             middle_attitude[:, :] = attitude
             middle_velocity[:] = velocity
             middle_position[:] = position
-        if i == stop - latency_samples:
+        if i == taken:
             _keep_fix(attitude, velocity, position, fix)
         for a in range(3):
             rate[a] = angular_rate[i, a] + residual_bias[a]
@@ -338,25 +344,26 @@ def reset(
 
 @njit(cache=True, nogil=True)
 def rotate(attitude: Floats, x: float, y: float, z: float) -> None:
-    """C <- (I + [θ x]) C, made orthonormal again by three steps of C <- C (3 I - C'C) / 2; in place."""
-    for j in range(3):
-        a, b, c = attitude[0, j], attitude[1, j], attitude[2, j]
-        attitude[0, j] = a - z * b + y * c
-        attitude[1, j] = b + z * a - x * c
-        attitude[2, j] = c - y * a + x * b
-    product, result = np.empty((3, 3)), np.empty((3, 3))
-    for _ in range(3):
-        for i in range(3):
-            for j in range(3):
-                total = 0.0
-                for k in range(3):
-                    total += attitude[k, i] * attitude[k, j]
-                product[i, j] = -total
-            product[i, i] += 3.0
-        for i in range(3):
-            for j in range(3):
-                total = 0.0
-                for k in range(3):
-                    total += attitude[i, k] * product[k, j]
-                result[i, j] = 0.5 * total
-        attitude[:, :] = result
+    """C <- Exp([θ x]) C by a rotation vector θ of any length, rad; C (3, 3) in place.
+
+    The turn is exact (Rodrigues). One step of C <- C (3 I - C'C) / 2 takes away the rounding of all turns before it.
+    """
+    turned = product(rotation(x, y, z), load_matrix(attitude))
+    square = product(transpose(turned), turned)
+    turned = product(
+        turned,
+        (
+            1.5 - 0.5 * square[0],
+            -0.5 * square[1],
+            -0.5 * square[2],
+            -0.5 * square[3],
+            1.5 - 0.5 * square[4],
+            -0.5 * square[5],
+            -0.5 * square[6],
+            -0.5 * square[7],
+            1.5 - 0.5 * square[8],
+        ),
+    )
+    for i in range(3):
+        for j in range(3):
+            attitude[i, j] = turned[3 * i + j]

@@ -23,9 +23,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.immutable import Immutable
+from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.tight_model import TightModel
 from spoofgym.navigation.tight_states import INERTIAL, POSITION
@@ -39,7 +40,7 @@ PACKED = NUM_STATES * (NUM_STATES + 1) // 2
 
 
 @dataclass(frozen=True)
-class CoastingTables:
+class CoastingTables(Immutable):
     """What all windows of all runs share, by epoch; rows are the epochs 1 - n..K.
 
     Attributes:

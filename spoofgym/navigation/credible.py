@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.immutable import Immutable
+from spoofgym.kernels import njit
 from spoofgym.navigation.credible_filter import (
     HEIGHT,
     POSITIONS,
@@ -61,7 +62,7 @@ class AuxiliaryRule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CredibleModel:
+class CredibleModel(Immutable):
     """What the N runs go through, epochs 0..K.
 
     Attributes:
@@ -92,6 +93,7 @@ class CredibleNavigator:
         credit: fixes used in a row, (N,), as far as the rule counts them.
         displacement: what the odometer gives for each step of the episode, (N, J, 2), m.
         index: the epoch where each run stands, (N,); -1 before the first.
+        diverged: whether the filter has diverged, (N,); a linear one never does.
         backtracked: epochs that the last `resolve` took back, (N,).
         history: epochs that can be taken back.
     """
@@ -113,6 +115,7 @@ class CredibleNavigator:
         self.credit = np.zeros(num_runs, dtype=np.int64)
         self.displacement = np.zeros((num_runs, model.motion.num_steps, 2))
         self.index = np.full(num_runs, -1)
+        self.diverged = np.zeros(num_runs, dtype=bool)  # a linear filter never does
         self.backtracked = np.zeros(num_runs, dtype=np.int64)
         self.history = demands.history
         self._past = np.zeros((num_runs, demands.history + 1 if demands.history else 0, NUM_KEPT))

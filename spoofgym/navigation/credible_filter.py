@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.linalg import solve_discrete_lyapunov
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT

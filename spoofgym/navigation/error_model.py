@@ -14,10 +14,10 @@ vertical channel, which Liu omits, as in Groves 2013 eq 14.63.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
 from spoofgym.geodesy import earth_rate, normal_gravity, radii_of_curvature
+from spoofgym.kernels import njit
 
 NUM_NAVIGATION = 9
 NUM_STATES = 15

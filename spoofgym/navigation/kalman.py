@@ -15,9 +15,9 @@ U' (m, 15), so that every inner loop runs along a row. Source: Bar-Shalom, Li an
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 N = 9
 FULL = 15

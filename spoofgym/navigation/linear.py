@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
@@ -33,6 +33,7 @@ class LinearNavigator:
         model: the game.
         state: the true error of the 15 states, (N, 15).
         index: the epoch where each run stands, (N,); -1 before the first.
+        diverged: whether the filter has diverged, (N,); a linear one never does.
         normals: standard normal process noise of the episode, (N, K+1, 9); overwrite it to inject a noise path.
         bias_steps: changes of the biases at each epoch, (N, K+1, 6), or (N, 0, 6) where they are constant.
         true_bias: gyro and accelerometer biases, (N, 6), rad/s and m/s².
@@ -64,6 +65,7 @@ class LinearNavigator:
         self.model = model
         self.state = np.zeros((num_runs, NUM_STATES))
         self.index = np.full(num_runs, -1)
+        self.diverged = np.zeros(num_runs, dtype=bool)  # a linear filter never does
         self.normals = np.zeros((num_runs, epochs, NUM_NAVIGATION))
         unstable = bool(np.any(grade.instability_sigma))
         self.bias_steps = np.zeros((num_runs, epochs if unstable else 0, 6))

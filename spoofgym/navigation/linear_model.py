@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.immutable import Immutable
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
 from spoofgym.navigation.interface import Timeline
@@ -41,7 +42,7 @@ class ErrorDynamics:
 
 
 @dataclass(frozen=True)
-class LinearModel:
+class LinearModel(Immutable):
     """A game in the linear fidelity: epochs k = 0..K, of which 0 is the last clean one.
 
     Attributes:

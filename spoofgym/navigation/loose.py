@@ -1,8 +1,9 @@
 """The strapdown fidelity: N loosely coupled INS/GNSS filters at the IMU rate, closed loop.
 
-Between two fixes each run mechanizes its own noisy samples; at the epoch the error dynamics are formed once, from the
-mean specific force and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order;
-process noise half before, half after Φ). The estimated error is fed back into the mechanization after every used fix.
+Between two fixes each run mechanizes its own noisy samples; the error dynamics are formed from the mean specific force
+and the state in the middle of the epoch, and carry the covariance over the epoch (Φ to third order; process noise half
+before, half after Φ). A long epoch, as an outage of a recorded log, is cut into parts of about a second, for each of
+which this is done. The estimated error is fed back into the mechanization after every used fix.
 
 The history is a ring of the states after each resolved epoch. A backtrack of n epochs restores the state after the fix
 before them and mechanizes the stored inertial samples (their stored noise on the true motion) to the present epoch.
@@ -15,6 +16,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.navigation import closed_loop
+from spoofgym.navigation.divergence import NUM_HELD, blank, hold
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.navigation.linear import NO_DEMANDS
@@ -40,6 +42,7 @@ class StrapdownNavigator:
         true_bias: what they really are, (N, 6).
         covariance: P, (N, 15, 15).
         index: the epoch where each run stands, (N,); -1 before the first.
+        diverged: whether the filter has diverged since the episode began, (N,); its solution is then held.
         history: epochs that can be taken back.
         backtracked: epochs that the last `resolve` took back, (N,).
         auxiliary: error state of the unaided inertial solution minus that of the filter, (N, 15), to first order; (N,
@@ -60,8 +63,11 @@ class StrapdownNavigator:
         self.true_bias = np.zeros((num_runs, 6))
         self.covariance = np.zeros((num_runs, NUM_STATES, NUM_STATES))
         self.index = np.full(num_runs, -1)
+        self.diverged = np.zeros(num_runs, dtype=bool)
         self.backtracked = np.zeros(num_runs, dtype=np.int64)
         self.auxiliary = np.zeros((num_runs, NUM_STATES if demands.auxiliary else 0))
+        self._held = np.zeros((num_runs, NUM_HELD))
+        self._prior_covariance = model.prior_covariance
         self._instability = np.zeros((num_runs, 6))
         self._fix = np.zeros((num_runs, 6, 3))
         self._gain = np.zeros((num_runs, m, NUM_STATES))
@@ -110,10 +116,27 @@ class StrapdownNavigator:
             self.attitude[run] = model.attitude
             closed_loop.rotate(self.attitude[run], -x[0], -x[1], -x[2])
             if self._noisy:
-                self._generators[int(run)] = streams(run, "imu").spawn(1)[0]
+                self._generators[int(run)] = streams.spawn(run, "imu")
         self._instability[runs] = initial[:, INSTABILITY]
         self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
         self.bias[runs] = self.true_bias[runs] - error[:, 9:15]
+        self.diverged[runs] = False
+        self._hold(runs)
+
+    def _hold(self, runs: Runs) -> None:
+        """Keep what is valid; hold what has diverged."""
+        hold(
+            runs,
+            self.attitude,
+            self.velocity,
+            self.position,
+            self.bias,
+            self.covariance,
+            self.auxiliary,
+            self._prior_covariance,
+            self._held,
+            self.diverged,
+        )
 
     def restart_auxiliary(self, runs: Runs) -> None:
         """Let the unaided inertial solution of runs, where there is one, begin anew from the filter's."""
@@ -124,6 +147,7 @@ class StrapdownNavigator:
         runs = self._all if runs is None else runs
         self._keep(runs)
         self._slices.call(self._propagate_slice, runs, 1)
+        self._hold(runs)
 
     def _keep(self, runs: Runs) -> None:
         """Write the resolved states into the history."""
@@ -156,7 +180,7 @@ class StrapdownNavigator:
             model.angular_rate,
             model.specific_force,
             model.step,
-            model.boundaries,
+            *model.parts,
             model.latency_samples,
             model.filter_density,
             self._process_scale,
@@ -206,8 +230,19 @@ class StrapdownNavigator:
             self._all[: len(runs)],
             GRAIN,
         )
+        lost = self._lost(runs, nis)
+        if len(lost):
+            blank(lost, residual, innovation, whitened, nis)
         self._whitened[runs], self._residual[runs] = whitened, residual
         return Innovation(residual, innovation, whitened, nis)
+
+    def _lost(self, runs: Runs, nis: Floats) -> Runs:
+        """Places of innovations that are not finite, (k,): S is no longer positive, and their runs have diverged."""
+        lost = np.flatnonzero(~np.isfinite(nis))
+        if len(lost):
+            self.diverged[runs[lost]] = True
+            self._gain[runs[lost]] = 0.0
+        return lost
 
     def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
         """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
@@ -229,6 +264,7 @@ class StrapdownNavigator:
             self._reset_to_fix(runs[jumps], decision.reset[jumps])
             used = used & ~jumps
         self._correct(runs[used])
+        self._hold(runs)
         if before is not None:
             self._move_auxiliary(runs, before)
 

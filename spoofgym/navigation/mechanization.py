@@ -17,10 +17,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.geodesy import earth_rate, normal_gravity, radii_of_curvature, transport_rate
+from spoofgym.kernels import njit
 
 Vector = tuple[float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]

@@ -7,9 +7,9 @@ u'H'S⁻¹γ, of variance u'H'S⁻¹H u. With the whitened innovation w = L⁻¹
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 
 OBSERVED = 1e-12

@@ -7,9 +7,9 @@ epoch after which it was opened.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation.coasting import PACKED, CoastingTables
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.tight_filter import POSITION

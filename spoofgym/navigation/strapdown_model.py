@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.arrays import Floats
+from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import displace
+from spoofgym.immutable import Immutable
 from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import antenna_arm
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
@@ -16,9 +18,13 @@ from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.trajectory import Trajectory
 
+PART = 1.0
+"""Length of the parts in which the covariance is carried over a long epoch, s; one may be half longer or shorter. The
+error dynamics are constant over a part, so it must be short beside a turn."""
+
 
 @dataclass(frozen=True)
-class StrapdownModel:
+class StrapdownModel(Immutable):
     """What N strapdown navigators have in common: epochs k = 0..K, of which 0 is the last clean one.
 
     The samples come from a true trajectory, with sensor errors added per run, or from a recorded log, whose samples
@@ -78,6 +84,27 @@ class StrapdownModel:
     def num_epochs(self) -> int:
         """K."""
         return len(self.time) - 1
+
+    @cached_property
+    def parts(self) -> tuple[Runs, Runs]:
+        """The samples of each epoch in parts of about `PART`; one where the epoch is not longer than one and a half.
+
+        Returns:
+            Bounds: samples bounds[p]..bounds[p+1] are part p, (P+1,); and places among them: parts
+            places[k]..places[k+1] lead to epoch k, (K+2,).
+        """
+        ends = np.concatenate([[0.0], np.cumsum(self.step)])
+        number = np.maximum(np.round(np.diff(ends[self.boundaries]) / PART), 1.0).astype(np.int64)
+        if (number == 1).all():
+            return self.boundaries, np.arange(len(self.boundaries))
+        bounds, places = [self.boundaries[:1]], [0]
+        for first, last, parts in zip(self.boundaries[:-1], self.boundaries[1:], number.tolist(), strict=True):
+            cuts = np.linspace(ends[first], ends[last], parts + 1)[1:-1]
+            # the sample that ends nearest to each cut
+            inner = first + np.searchsorted(0.5 * (ends[first:last] + ends[first + 1 : last + 1]), cuts)
+            bounds.append(np.unique([*inner[(inner > first) & (inner < last)], last]))
+            places.append(places[-1] + len(bounds[-1]))
+        return np.concatenate(bounds).astype(np.int64), np.array(places)
 
     @property
     def max_samples(self) -> int:

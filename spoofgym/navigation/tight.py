@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman, tight_filter
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
@@ -33,6 +33,7 @@ class TightNavigator:
         model: the game.
         state: the true error of all states, (N, n).
         index: the epoch where each run stands, (N,); -1 before the first.
+        diverged: whether the filter has diverged, (N,); a linear one never does.
         normals: standard normals of the episode, (N, K+1, n): process noise, or the true values of a new satellite's
             states; overwrite them to inject a noise path.
         true_bias: gyro and accelerometer biases, (N, 6), rad/s and m/s².
@@ -58,6 +59,7 @@ class TightNavigator:
         self.model = model
         self.state = np.zeros((num_runs, n))
         self.index = np.full(num_runs, -1)
+        self.diverged = np.zeros(num_runs, dtype=bool)  # a linear filter never does
         self.normals = np.zeros((num_runs, model.num_epochs + 1, n))
         self.true_bias = np.zeros((num_runs, 6))
         self.backtracked = np.zeros(num_runs, dtype=np.int64)

@@ -6,9 +6,8 @@ the diagonal, every other state has its decay alone; a row of H has nine entries
 
 from __future__ import annotations
 
-from numba import njit
-
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.tight_states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE

@@ -10,10 +10,11 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.immutable import Immutable
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman, tight_filter
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import ErrorDynamics, semidefinite_factor
@@ -34,12 +35,14 @@ from spoofgym.sensors.ranging import RangeErrors, clock_noise
 
 
 @dataclass(frozen=True)
-class TightDynamics:
+class TightDynamics(Immutable):
     """What acts on the error state, epoch by epoch, and what observes it; leading axis: epochs.
 
     Attributes:
         time: of the epochs, (E,), s.
-        interval: between them, s.
+        interval: usual time between them, s, over which all but the clock's offset are carried.
+        intervals: time from the epoch before, (E,), s.
+        clock_jump: variance that a step of the receiver's clock, of a size not known, adds to its offset, (E,), m².
         satellite: number of the satellite in each slot, -1 = empty, (E, S).
         line_of_sight: unit vectors to the satellites, (E, S, 3), ENU.
         transition: first nine rows of Φ from the epoch before, (E, 9, 15).
@@ -56,6 +59,8 @@ class TightDynamics:
 
     time: Floats
     interval: float
+    intervals: Floats
+    clock_jump: Floats
     satellite: NDArray[np.int64]
     line_of_sight: Floats
     transition: Floats
@@ -123,7 +128,7 @@ class TightDynamics:
 
 
 @dataclass(frozen=True)
-class TightModel:
+class TightModel(Immutable):
     """A game of the tightly coupled filter: epochs k = 0..K, of which 0 is the last clean one; every range used.
 
     Attributes:
@@ -214,6 +219,8 @@ def tight_dynamics(
     return TightDynamics(
         time=geometry.time,
         interval=interval,
+        intervals=np.full(len(geometry.time), interval),
+        clock_jump=np.zeros(len(geometry.time)),
         satellite=geometry.satellite,
         line_of_sight=geometry.line_of_sight,
         transition=np.ascontiguousarray(inertial.transition[:, :NUM_NAVIGATION]),
@@ -311,7 +318,8 @@ def _run(dynamics: TightDynamics, covariance: Floats, kept: tuple[Floats, ...]) 
         dynamics.decay,
         dynamics.variance,
         dynamics.clock_noise,
-        dynamics.interval,
+        dynamics.intervals,
+        dynamics.clock_jump,
         dynamics.started,
         dynamics.satellite_sigma,
         dynamics.columns,
@@ -333,7 +341,8 @@ def _recursion(
     decay: Floats,
     variance: Floats,
     clock_noise: Floats,
-    interval: float,
+    intervals: Floats,
+    clock_jump: Floats,
     started: Flags,
     satellite_sigma: Floats,
     columns: Runs,
@@ -353,8 +362,9 @@ def _recursion(
     keep = len(prior) > 0
     for k in range(len(transition)):
         tight_filter.predict_covariance(
-            transition[k], process_noise[k], decay, variance, clock_noise, interval, covariance, work
+            transition[k], process_noise[k], decay, variance, clock_noise, intervals[k], covariance, work
         )
+        covariance[CLOCK, CLOCK] += clock_jump[k]
         tight_filter.start_satellites(started[k], satellite_sigma, covariance)
         tight_filter.innovation_covariance(covariance, columns, values[k], noise_variance[k], cross, innovation)
         kalman.cholesky(innovation, factor)

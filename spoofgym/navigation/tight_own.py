@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation import tight_filter
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation

@@ -7,11 +7,12 @@ linear by itself (clock, atmosphere, multipath, ambiguities) is carried as its e
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, ecef, geodetic_to_ecef
+from spoofgym.kernels import njit
 from spoofgym.navigation import closed_loop, kalman, tight_filter
+from spoofgym.navigation.divergence import blank
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.navigation.linear import NO_DEMANDS
@@ -67,13 +68,22 @@ class TightStrapdownNavigator(StrapdownNavigator):
         self.state = np.zeros((num_runs, n))
         self.range_normals = np.zeros((num_runs, tight.num_epochs + 1, n))
         self.covariance = np.zeros((num_runs, n, n))
+        self._prior_covariance = tight.prior_covariance
         self._gain = np.zeros((num_runs, m, n))
         self._whitened = np.zeros((num_runs, m))
         self._deviation = np.zeros((num_runs, m))
         self._response = np.zeros((num_runs, m, 3))
         self._every_satellite = np.ones((num_runs, tight.dynamics.num_slots), dtype=bool)
-        # the truth has no history: only the filter goes back
-        self._resolved = (self.attitude, self.velocity, self.position, self.bias, self.state, self.covariance)
+        # the true bias goes back, too: the stored noise then carries it forward to the same bits
+        self._resolved = (
+            self.attitude,
+            self.velocity,
+            self.position,
+            self.bias,
+            self.true_bias,
+            self.state,
+            self.covariance,
+        )
         self._past = tuple(np.zeros((num_runs, slots, *part.shape[1:])) for part in self._resolved)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
@@ -93,20 +103,17 @@ class TightStrapdownNavigator(StrapdownNavigator):
         for run, x in zip(runs.tolist(), error, strict=True):
             self.attitude[run] = model.attitude
             closed_loop.rotate(self.attitude[run], -x[0], -x[1], -x[2])
-            stream = streams(run, "imu")
-            stream.standard_normal(out=self.range_normals[run])
-            self._generators[run] = stream.spawn(1)[0]
+            streams(run, "imu").standard_normal(out=self.range_normals[run])
+            self._generators[run] = streams.spawn(run, "imu")
+        self.diverged[runs] = False
+        self._hold(runs)
+
+    def _hold(self, runs: Runs) -> None:
+        super()._hold(runs)
+        if self.diverged.any():  # what a diverged filter believes of clock and atmosphere may not be finite
+            self.state[self.diverged] = 0.0
 
     def _mechanize(self, runs: Runs, auxiliary: Floats) -> None:
-        self._carry(runs, auxiliary, self.true_bias)
-
-    def _backtrack_slice(self, runs: Runs) -> None:
-        truth = self.true_bias
-        self.true_bias = truth.copy()
-        super()._backtrack_slice(runs)
-        self.true_bias = truth
-
-    def _carry(self, runs: Runs, auxiliary: Floats, true_bias: Floats) -> None:
         model, dynamics = self.model, self.tight.dynamics
         _propagate(
             runs,
@@ -115,7 +122,7 @@ class TightStrapdownNavigator(StrapdownNavigator):
             self.velocity,
             self.position,
             self.bias,
-            true_bias,
+            self.true_bias,
             self.state,
             self.covariance,
             self._fix,
@@ -124,7 +131,7 @@ class TightStrapdownNavigator(StrapdownNavigator):
             model.angular_rate,
             model.specific_force,
             model.step,
-            model.boundaries,
+            *model.parts,
             model.filter_density,
             model.true_noise,
             dynamics.noise_columns,
@@ -133,7 +140,8 @@ class TightStrapdownNavigator(StrapdownNavigator):
             dynamics.noise_sigma,
             dynamics.clock_noise,
             dynamics.clock_factor,
-            dynamics.interval,
+            dynamics.intervals,
+            dynamics.clock_jump,
             dynamics.started,
             dynamics.satellite_sigma,
             auxiliary,
@@ -182,6 +190,10 @@ class TightStrapdownNavigator(StrapdownNavigator):
             self._all[: len(runs)],
             GRAIN,
         )
+        lost = self._lost(runs, nis)
+        if len(lost):
+            blank(lost, residual, covariance, whitened, nis)
+            response[lost] = 0.0
         self._whitened[runs], self._response[runs] = whitened, response
         present = np.tile(at_epochs(dynamics.present, self.index[runs]) & satellites, (1, 2))
         return Innovation(residual, covariance, whitened, nis, response, present)
@@ -205,6 +217,7 @@ class TightStrapdownNavigator(StrapdownNavigator):
             self._reset_to_fix(runs[jumps], decision.reset[jumps])
             used = used & ~jumps
         self._correct(runs[used])
+        self._hold(runs)
         if before is not None:
             self._move_auxiliary(runs, before)
 
@@ -272,7 +285,8 @@ def _propagate(
     angular_rate: Floats,
     specific_force: Floats,
     step: Floats,
-    boundaries: Runs,
+    bounds: Runs,
+    places: Runs,
     filter_density: Floats,
     true_noise: Floats,
     noise_columns: Floats,
@@ -281,17 +295,22 @@ def _propagate(
     sigma: Floats,
     clock_noise: Floats,
     clock_factor: Floats,
-    epoch: float,
+    intervals: Floats,
+    clock_jump: Floats,
     started: Flags,
     satellite_sigma: Floats,
     auxiliary: Floats,
 ) -> None:
-    """Carry runs over one epoch: mechanization, the other states, covariance; the noise half before, half after Φ."""
+    """Carry runs over one epoch: mechanization, the other states, covariance; the noise half before, half after Φ.
+
+    The mechanization goes part by part; the other states are held until the end of the epoch.
+    """
     n = state.shape[1]
     mean_force, residual_bias, mean, work = np.empty(3), np.empty(6), np.empty(NUM_NAVIGATION), np.empty(NUM_NAVIGATION)
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, n))
     half_noise, nothing = np.zeros((NUM_NAVIGATION, NUM_NAVIGATION)), np.zeros((NUM_STATES, NUM_NAVIGATION))
-    noise = np.empty(n)
+    no_noise = np.zeros((2, 2))
+    noise, held, still = np.empty(n), np.ones(n), np.zeros(n)
     noisy = normals.shape[2] > 0
     last = normals.shape[2] - closed_loop.NUM_EPOCH_NOISES
     for run in runs:
@@ -300,23 +319,40 @@ def _propagate(
         sampled = normals[run, k % normals.shape[1]]
         for a in range(6):
             residual_bias[a] = true_bias[run, a] - bias[run, a]
-        interval = closed_loop.mechanize_epoch(
-            boundaries[k],
-            boundaries[k + 1],
-            0,
-            residual_bias,
-            sampled,
-            angular_rate,
-            specific_force,
-            step,
-            true_noise,
-            attitude[run],
-            velocity[run],
-            position[run],
-            fix[run],
-            mean_force,
-            transition,
-        )
+        begin, end = places[k], places[k + 1]
+        start, interval = bounds[begin], 0.0
+        for part in range(begin, end):
+            length = closed_loop.mechanize_part(
+                bounds[part],
+                bounds[part + 1],
+                -1,
+                residual_bias,
+                sampled[closed_loop.NUM_SAMPLE_NOISES * (bounds[part] - start) :],
+                angular_rate,
+                specific_force,
+                step,
+                true_noise,
+                attitude[run],
+                velocity[run],
+                position[run],
+                fix[run],
+                mean_force,
+                transition,
+            )
+            for i in range(NUM_NAVIGATION):
+                half_noise[i, i] = 0.5 * length * filter_density[i]
+                covariance[run, i, i] += half_noise[i, i]
+            if part == end - 1:
+                tight_filter.predict_covariance(
+                    transition, half_noise, decay, variance, clock_noise, intervals[k], covariance[run], product
+                )
+            else:
+                tight_filter.predict_covariance(
+                    transition, half_noise, held, still, no_noise, 0.0, covariance[run], product
+                )
+            if auxiliary.shape[1] > 0:
+                kalman.predict_mean(transition, auxiliary[run], mean)
+            interval += length
         if noisy:
             closed_loop.disturb_position(position[run], true_noise, np.sqrt(interval), sampled[last:])
         draw_process_noise(noise_columns[k], sigma, clock_factor, range_normals[run, k], noise)
@@ -325,17 +361,11 @@ def _propagate(
             true_bias[run, a] = decay[place] * true_bias[run, a] + noise[place]
             bias[run, a] *= decay[place]
         noise[:NUM_STATES] = 0.0
-        tight_filter.predict_error(nothing, decay, epoch, noise, state[run], work)
+        tight_filter.predict_error(nothing, decay, intervals[k], noise, state[run], work)
         start_satellites(started[k], satellite_sigma, range_normals[run, k], state[run])
-        for i in range(NUM_NAVIGATION):
-            half_noise[i, i] = 0.5 * interval * filter_density[i]
-            covariance[run, i, i] += half_noise[i, i]
-        tight_filter.predict_covariance(
-            transition, half_noise, decay, variance, clock_noise, epoch, covariance[run], product
-        )
+        covariance[run, CLOCK, CLOCK] += clock_jump[k]
         tight_filter.start_satellites(started[k], satellite_sigma, covariance[run])
         if auxiliary.shape[1] > 0:
-            kalman.predict_mean(transition, auxiliary[run], mean)
             for i in range(NUM_NAVIGATION, NUM_STATES):
                 auxiliary[run, i] *= decay[i]
 

@@ -6,9 +6,9 @@ M is that of `coasting`: the filter's covariance without the coasting's process 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.kernels import njit
 from spoofgym.navigation.coasting import PACKED
 from spoofgym.navigation.error_model import NUM_STATES
 

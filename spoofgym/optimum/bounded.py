@@ -16,10 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.optimize import OptimizeResult, minimize
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.closed_form import best_budget
 from spoofgym.optimum.play import Outcome, expected_play

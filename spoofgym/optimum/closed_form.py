@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.navigation.expected_innovation import check_position_fix, offsets_of
 from spoofgym.navigation.linear_model import LinearModel
@@ -58,8 +59,7 @@ def noncentrality_optimum(model: LinearModel, num_epochs: int, budget: float) ->
     """
     check_position_fix(model, "a closed form")
     check_epochs(model, num_epochs)
-    if not (math.isfinite(budget) and budget >= 0.0):
-        raise ValueError(f"budget must be finite and not negative, got {budget!r}")
+    budget = validation.non_negative("noncentrality_optimum", "budget", budget)
     gain, direction, profile = _furthest(error_response(model, num_epochs))
     whitened = math.sqrt(budget) * profile
     return ClosedForm(budget, gain, azimuth_of(direction), whitened, offsets_of(model, whitened))

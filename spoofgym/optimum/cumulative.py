@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from spoofgym import validation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.closed_form import ClosedForm, noncentrality_optimum
+from spoofgym.optimum.response import check_epochs
 from spoofgym.optimum.survival import check_threshold, log_survival
 
 
@@ -42,8 +43,8 @@ def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> flo
 
     if excess(0.0) <= 0.0:
         raise ValueError(
-            f"cumulative test: without any bias threshold {threshold:g} with {degrees} degrees of freedom is passed "
-            f"with probability {missed * math.exp(excess(0.0)):.3g}, not more than {missed:g}"
+            f"cumulative test: without any bias threshold {validation.written(threshold)} with {degrees} degrees of "
+            f"freedom is passed with probability {missed * math.exp(excess(0.0)):.3g}, not more than {validation.written(missed)}"
         )
     far = math.sqrt(threshold) + 1.0
     while excess(far) > 0.0:
@@ -68,5 +69,6 @@ def cumulative_optimum(
     Raises:
         ValueError: m is not 3, more epochs than the model has, or a value out of range.
     """
+    check_epochs(model, num_epochs)
     magnitude = missed_magnitude(threshold, num_epochs * model.dimension, missed)
     return noncentrality_optimum(model, num_epochs, magnitude**2), magnitude

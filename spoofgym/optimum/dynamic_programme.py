@@ -15,9 +15,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.response import error_response
 from spoofgym.optimum.survival import check_threshold, log_survival
@@ -60,8 +61,8 @@ def dynamic_programme(model: LinearModel, threshold: float, azimuth: float, tole
         RuntimeError: the score still changes after eight halvings.
     """
     check_threshold(threshold)
-    if not tolerance > 0.0:
-        raise ValueError(f"tolerance must be positive, got {tolerance!r}")
+    tolerance = validation.above("dynamic_programme", "tolerance", tolerance)
+    azimuth = validation.finite("dynamic_programme", "azimuth", azimuth)
     gain = aimed_gain(error_response(model, model.num_epochs), np.array([azimuth]))[0]
     step = float(np.median(gain))
     coarse = _lattice_score(gain, step, model.dimension, threshold)

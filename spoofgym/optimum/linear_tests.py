@@ -77,8 +77,12 @@ def window_mean(n: int, limit: float) -> list[LinearTest]:
     Raises:
         ValueError: a window of less than one epoch.
     """
-    n = validation.whole("window_mean", "n", n, 1)
+    n = validation.epochs("window_mean", "n", n)
     return per_axis(f"window-mean:{n}", np.full(n, 1.0 / math.sqrt(n)), limit)
+
+
+LEAST_WEIGHT = 3e-4
+"""Of λ: a smaller one remembers more epochs than games have."""
 
 
 def ewma(weight: float, limit: float) -> list[LinearTest]:
@@ -94,6 +98,8 @@ def ewma(weight: float, limit: float) -> list[LinearTest]:
         ValueError: a weight out of range.
     """
     weight = validation.above("ewma", "weight", weight)
+    if weight < LEAST_WEIGHT:
+        raise ValueError(f"ewma: weight must be {LEAST_WEIGHT} or more, got {weight!r}")
     if weight > 1.0:
         raise ValueError(f"ewma: weight must be at most 1, got {weight!r}")
     length = 1 if weight == 1.0 else math.ceil(math.log(FORGOTTEN) / math.log1p(-weight))

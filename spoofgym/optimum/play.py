@@ -19,9 +19,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel

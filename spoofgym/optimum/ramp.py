@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.play import Outcome, expected_play
@@ -59,7 +60,7 @@ def best_ramp(
     played = expected_play(model, unit, threshold)
     response, error = played.whitened, played.final_error  # of 1 m/s east and north: (2, K, m) and (2, 2)
     if azimuth is not None:
-        candidates = np.array([azimuth % 360.0])
+        candidates = np.array([validation.finite("best_ramp", "azimuth", azimuth) % 360.0])
         rate = _best_rates(response, error, candidates, threshold, limit)[0]
         best = 0
     else:
@@ -82,10 +83,11 @@ def axis_limits(drag_off_rate: Floats | float | None) -> Floats:
     Raises:
         ValueError: a rate that is not positive, or not one number or three.
     """
-    limits = np.asarray(np.inf if drag_off_rate is None else drag_off_rate, dtype=np.float64)
-    if limits.shape not in ((), (3,)) or not (limits > 0.0).all():
-        raise ValueError(f"drag_off_rate must be one positive number or three (east, north, up), got {drag_off_rate!r}")
-    return np.broadcast_to(limits, (3,))
+    limits = validation.real_array(np.inf if drag_off_rate is None else drag_off_rate)
+    if limits is None or limits.shape not in ((), (3,)) or not (limits > 0.0).all():
+        given = validation.shown(drag_off_rate)
+        raise ValueError(f"drag_off_rate must be one positive number or three (east, north, up), got {given}")
+    return np.broadcast_to(np.asarray(limits, dtype=np.float64), (3,))
 
 
 def _best_rates(

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.play import HORIZONTAL
 
 
-def check_epochs(model: LinearModel, num_epochs: int) -> None:
+def check_epochs(model: LinearModel, num_epochs: object) -> None:
     """Refuse a number of epochs that the model does not have.
 
     Raises:
         ValueError: fewer than one epoch, or more than the model's K.
     """
     available = model.num_epochs
-    if not 1 <= num_epochs <= available:
-        raise ValueError(f"num_epochs must lie in 1..{available} (the epochs of the model), got {num_epochs}")
+    if not isinstance(num_epochs, int | np.integer) or not 1 <= num_epochs <= available:
+        raise ValueError(
+            f"num_epochs must lie in 1..{available} (the epochs of the model), got {validation.shown(num_epochs)}"
+        )
 
 
 def error_response(model: LinearModel, num_epochs: int) -> Floats:

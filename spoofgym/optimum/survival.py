@@ -14,22 +14,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 # Beyond this distance of |u| from √threshold the leading term of the asymptotic expansion replaces the mixture.
 _FAR = 1000.0
+LARGEST_THRESHOLD = 1e6
+"""With a larger one the mixture has too many terms."""
 
 
 def check_threshold(threshold: float) -> None:
     """Refuse a threshold that no snapshot test can have.
 
     Raises:
-        ValueError: the threshold is not a positive finite number.
+        ValueError: the threshold is not a positive number of at most `LARGEST_THRESHOLD`.
     """
-    if not (math.isfinite(threshold) and threshold > 0.0):
-        raise ValueError(f"threshold must be positive and finite, got {threshold!r}")
+    validation.above("snapshot test", "threshold", threshold, largest=LARGEST_THRESHOLD)
 
 
 def log_survival(magnitude: Floats, dimension: int, threshold: float) -> Floats:

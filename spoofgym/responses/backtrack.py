@@ -31,7 +31,7 @@ class ExcludeAndBacktrack(ExcludingResponse):
     kind = "exclude-and-backtrack"
 
     def __init__(self, n: int = FOI_DEPTH, reuse: int = 0, reuse_threshold: float | None = None) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
+        self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
         super().__init__(reuse_rule(self.kind, reuse, reuse_threshold), self.n)
 
     @property

@@ -47,8 +47,12 @@ class ConstantVelocityStart(ExcludingResponse):
         reuse: int = 0,
         reuse_threshold: float | None = None,
     ) -> None:
-        self.n = validation.whole(self.kind, "n", n, 1)
-        self.longest = validation.whole(self.kind, "longest", longest, self.n)
+        self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
+        self.longest = validation.epochs(self.kind, "longest", longest, 1, validation.LONGEST_TABLE)
+        if self.longest < self.n:
+            raise ValueError(
+                f"{self.kind}: longest must be a whole number, {self.n} or more, got {self.longest}: not less than n"
+            )
         self.acceleration = validation.above(self.kind, "acceleration", acceleration)
         self.hold = validation.above(self.kind, "hold", hold)
         super().__init__(reuse_rule(self.kind, reuse, reuse_threshold), self.longest)

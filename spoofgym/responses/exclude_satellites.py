@@ -14,12 +14,12 @@ chi-square with two degrees of freedom under a matched filter: what it measures 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import DEFAULT_P_FA, quantile
 from spoofgym.detectors.raim import UNKNOWNS, inverse_columns, orthonormal
+from spoofgym.kernels import njit
 from spoofgym.navigation.facts import RANGES
 from spoofgym.navigation.interface import Decision, Epoch
 from spoofgym.responses.base import Response, given

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs, take_runs
+from spoofgym.kernels import njit
 
 WINDOW = 50
 """Epochs among which the onset is looked for."""
@@ -26,7 +26,7 @@ class OnsetEstimator:
         Raises:
             ValueError: a window of less than one epoch.
         """
-        self.window = validation.whole("onset estimate", "window", window, 1)
+        self.window = validation.epochs("onset estimate", "window", window, 1)
         self._ring = np.zeros((num_runs, self.window, 2))
         self._place = np.zeros(num_runs, dtype=np.int64)
 

@@ -38,8 +38,8 @@ class OnsetDepth(ExcludingResponse):
         reuse: int = 0,
         reuse_threshold: float | None = None,
     ) -> None:
-        self.margin = validation.whole(self.kind, "margin", margin, 0)
-        self.window = validation.whole(self.kind, "window", window, 1)
+        self.margin = validation.epochs(self.kind, "margin", margin, 0, validation.LONGEST_TABLE)
+        self.window = validation.epochs(self.kind, "window", window, 1, validation.LONGEST_TABLE)
         super().__init__(reuse_rule(self.kind, reuse, reuse_threshold), self.window + self.margin)
 
     @property

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Sequence
 
 from spoofgym.arrays import Flags, Runs
-from spoofgym.detectors.base import Detector
+from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.navigation.interface import Decision, Epoch
 from spoofgym.responses.base import Response
 
@@ -21,16 +21,14 @@ class Watching(Response):
         """Let ``response`` follow the one of ``detectors`` that is called ``detector``.
 
         Raises:
-            ValueError: there is none of that name, or it has no threshold.
+            ValueError: there is none of that name, or it has no threshold that is a positive finite number.
         """
         found = [item for item in detectors if item.name == detector]
         if not found:
             raise ValueError(f"no detector {detector!r}; there are: {', '.join(item.name for item in detectors)}")
-        if found[0].threshold is None:
-            raise ValueError(f"detector {detector!r} has no threshold yet: calibrate it first")
         self._response = response
         self._detector = detector
-        self._threshold = found[0].threshold
+        self._threshold = require_threshold(found[0])
         self.demands = response.demands
         self.needs = response.needs
         self.in_position = response.in_position

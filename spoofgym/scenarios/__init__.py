@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from spoofgym import validation
 from spoofgym.scenario import Scenario
@@ -46,6 +47,13 @@ def _log_state(text: str) -> State | None:
     return log_state(folder) if given.name == "recorded" and folder is not None else None
 
 
+def _made(scenario: Any) -> Scenario:
+    """From the cache what a text names; what is neither text nor scenario is refused."""
+    if isinstance(scenario, Scenario):
+        return scenario
+    return _build(scenario) if isinstance(scenario, str) else build(scenario, SCENARIOS, "scenario")
+
+
 def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scenario:
     """The scenario that a specification names; an object is returned as it is.
 
@@ -61,7 +69,7 @@ def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scen
             of the other coupling.
     """
     if coupling is None:
-        return scenario if isinstance(scenario, Scenario) else _build(scenario)
+        return _made(scenario)
     validation.one_of("scenario", "coupling", coupling, COUPLINGS)
     made = _build(_with_coupling(scenario, coupling)) if isinstance(scenario, str) else make_scenario(scenario)
     if made.coupling != coupling:

@@ -16,7 +16,8 @@ from functools import lru_cache
 from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import SimulatedScenario
-from spoofgym.sensors.imu import grade
+from spoofgym.scenarios.limits import MOST_EPOCHS, NOISE_FACTORS
+from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.specification import spell
 from spoofgym.trajectory import Accelerate, Straight, Trajectory, Turn, fly
@@ -81,12 +82,18 @@ def foi_drive(
     Raises:
         ValueError: an unknown IMU or receiver, a factor that is not positive, or a game outside the drive.
     """
-    validation.one_of("foi-drive", "receiver", receiver, RECEIVERS)
+    owner = "foi-drive"
+    horizon = validation.whole(owner, "horizon", horizon, 1, MOST_EPOCHS)
+    onset = validation.above(owner, "onset", onset)
+    require_grade(owner, "imu", imu)
+    validation.one_of(owner, "receiver", receiver, RECEIVERS)
+    process_noise = validation.between(owner, "process_noise", process_noise, *NOISE_FACTORS)
+    bias_states = validation.boolean(owner, "bias_states", bias_states)
     white = receiver == "white"
     sigma = (1.0, 1.0, 1.0) if white else (3.0, 3.0, 3.0)
     return SimulatedScenario(
         name=spell(
-            "foi-drive",
+            owner,
             horizon=None if horizon == 230 else horizon,
             onset=None if onset == 20.0 else onset,
             imu=None if imu == "fog" else imu,
@@ -106,7 +113,7 @@ def foi_drive(
             position_sigma=sigma,
             initial_scale=1.0,
             position_random_walk=0.0,
-            process_noise_scale=validation.above("foi-drive", "process_noise", process_noise),
+            process_noise_scale=process_noise,
             measurement_sigma=sigma,
             bias_states=bias_states,
         ),

@@ -17,19 +17,22 @@ from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario, SimulatedScenario
 from spoofgym.sensors.constellation import gps_24
-from spoofgym.sensors.imu import grade
+from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import range_fix_along
 from spoofgym.sensors.ranging import KUJUR
 from spoofgym.sensors.receiver import ZERO, Receiver
 from spoofgym.specification import spell
 from spoofgym.tight_scenario import TightScenario
 from spoofgym.trajectory import Straight, Trajectory, fly
+from spoofgym.validation import written
 
 START = (math.radians(41.0 + 50.0 / 60.0 + 10.0 / 3600.0), -math.radians(87.0 + 37.0 / 60.0 + 30.0 / 3600.0), 12192.0)
 """Latitude rad, longitude rad, height m (40,000 ft)."""
 SPEED = 454.0 * 1852.0 / 3600.0
 """454 knots, m/s."""
 RATE = 2.0
+LONGEST = 7200.0
+"""Of the flight, s: its samples stay in memory."""
 MASK = math.radians(5.0)
 TUNING = FilterTuning(position_random_walk=0.0, initial_scale=1.0, position_sigma=(10.0, 10.0, 10.0))
 ALERT_LIMITS = (556.0, 50.0)
@@ -70,7 +73,7 @@ def kujur_flight(
             give a fix of epoch 0, as if they were white (ours, after Liu 2018, whose R is that sum, too).
         horizon: epochs of the game, half a second each.
         onset: time of the last clean epoch, s.
-        hour: of the constellation's day at which the flight starts.
+        hour: of the constellation's day at which the flight starts, from 0 to 24.
         imu: name of the IMU grade.
         horizontal_alert_limit: position error from which the navigation is hazardous, m.
         vertical_alert_limit: m.
@@ -82,9 +85,15 @@ def kujur_flight(
     """
     owner = "kujur-flight"
     validation.one_of(owner, "coupling", coupling, COUPLINGS)
-    validation.whole(owner, "horizon", horizon, 1)
-    validation.above(owner, "onset", onset)
-    validation.finite(owner, "hour", hour)
+    require_grade(owner, "imu", imu)
+    horizon = validation.whole(owner, "horizon", horizon, 1, round(LONGEST * RATE))
+    onset = validation.above(owner, "onset", onset, largest=LONGEST)
+    if onset + horizon / RATE > LONGEST:
+        raise ValueError(
+            f"{owner}: onset and horizon must end the game by {written(LONGEST)} s, got onset {written(onset)} s with "
+            f"a horizon of {horizon} epochs at {written(RATE)} Hz"
+        )
+    hour = validation.hour(owner, "hour", hour)
     limits = (
         validation.above(owner, "horizontal_alert_limit", horizontal_alert_limit),
         validation.above(owner, "vertical_alert_limit", vertical_alert_limit),

@@ -13,14 +13,16 @@ from functools import lru_cache
 from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenarios.limits import MOST_EPOCHS, RATES, SIGMAS
 from spoofgym.sensors.constellation import gps_24
-from spoofgym.sensors.imu import grade
+from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import MASK, range_fix_along
 from spoofgym.sensors.ranging import LIU
 from spoofgym.sensors.receiver import ZERO, Receiver
 from spoofgym.specification import spell
 from spoofgym.tight_scenario import TightScenario
 from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly
+from spoofgym.validation import written
 
 LIU_END = (math.radians(34.6887), math.radians(108.1915), 2283.0)
 """End of the flight: latitude rad, longitude rad, height m."""
@@ -110,7 +112,13 @@ def liu_flight(
     owner = "liu-flight"
     validation.one_of(owner, "noise", noise, NOISES)
     validation.one_of(owner, "coupling", coupling, COUPLINGS)
-    validation.above(owner, "sigma", sigma)
+    require_grade(owner, "imu", imu)
+    horizon = validation.whole(owner, "horizon", horizon, 1, MOST_EPOCHS)
+    onset = validation.above(owner, "onset", onset)
+    rate = validation.between(owner, "rate", rate, *RATES)
+    sigma = validation.between(owner, "sigma", sigma, *SIGMAS)
+    markov_sigma = validation.non_negative(owner, "markov_sigma", markov_sigma, SIGMAS[1])
+    markov_time = validation.zero_or_above(owner, "markov_time", markov_time)
     usual = DRAG_OFF_RATES[coupling]
     fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
     limits = (
@@ -118,6 +126,11 @@ def liu_flight(
         validation.above(owner, "vertical_alert_limit", vertical_alert_limit),
     )
     coloured = markov_sigma != 0.0 or markov_time != 0.0
+    if coloured and not (markov_sigma and markov_time):
+        raise ValueError(
+            f"{owner}: markov_sigma and markov_time go together, got {written(markov_sigma)} m with "
+            f"{written(markov_time)} s"
+        )
     name = spell(
         owner,
         horizon=None if horizon == 120 else horizon,

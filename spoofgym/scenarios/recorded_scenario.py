@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +19,7 @@ from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.alignment import Alignment, align
-from spoofgym.scenarios.clean_run import CleanRun
+from spoofgym.scenarios.clean_run import CleanRun, CleanRunDivergedError, coast
 from spoofgym.scenarios.log import Log, covered, interpolate
 from spoofgym.scenarios.log_warning import warn
 from spoofgym.scenarios.table import seconds
@@ -32,15 +34,13 @@ LARGEST_NIS = 1.5
 1; the process noise of recorded scenarios is so generous that the logs by which it was chosen stay below 0.9."""
 CHANCE = 1e-6
 """Probability that the mean NIS of a short log exceeds its limit although the model is right."""
-LOST_NIS = 100.0
-"""NIS of one epoch per degree of freedom from which a filter that diverged was lost."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedScenario(Scenario):
     """A game on a log, in the strapdown fidelity. The filter is aligned on its fixes and runs from there.
 
-    ``timeline.interval`` is the median of those between the epochs.
+    Epochs are where the receiver gave something; ``timeline.interval`` is the median of the times between them.
 
     Attributes:
         name: the specification that builds it.
@@ -159,7 +159,7 @@ class RecordedScenario(Scenario):
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
         time = self.epoch_time[self.first : self.last + 1]
-        return Timeline(float(time[0]), float(np.median(np.diff(time))), len(time) - 1)
+        return Timeline(time, float(np.median(np.diff(time))))
 
     def _check_imu(self, onset: float, end: float) -> None:
         time, begin = self.log.imu_time, self.align_time
@@ -256,21 +256,27 @@ class RecordedScenario(Scenario):
             prior_covariance=clean.covariance[first],
         )
 
-    def _check_clean(self, run: CleanRun) -> None:
-        """Refuse a clean run that went astray, and warn of one whose innovations are too large.
+    @contextmanager
+    def _refusing_divergence(self) -> Iterator[None]:
+        """Refuse the log where the clean run made in this block diverges.
 
         Raises:
-            ValueError: its position is not finite.
+            ValueError: it does; the message says when, and likely reasons.
+        """
+        try:
+            yield
+        except CleanRunDivergedError as error:
+            raise ValueError(
+                f"scenario {self.name!r}: the filter diverges on this log; innovations are first too large at "
+                f"{seconds(error.lost)} s{self.log.fixes.line(error.lost)}; likely reasons: {self.doubts} ({error})"
+            ) from error
+
+    def _warn_of_large_innovations(self, run: CleanRun) -> None:
+        """Warn of a clean run whose innovations are too large.
 
         Warns:
             LogWarning: the mean NIS, from `SETTLING` after the alignment on, and likely reasons.
         """
-        if not np.all(np.isfinite(run.position)):
-            lost = int(np.argmax(~(run.nis <= LOST_NIS * run.degrees)))
-            raise ValueError(
-                f"scenario {self.name!r}: the filter diverges on this log; innovations are first too large at "
-                f"{self._place(lost)}; likely reasons: {self.doubts}"
-            )
         settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
         first = settled if settled < len(self.epoch_time) else 0
         per_degree, degrees = run.nis_per_degree(first), float(run.degrees[first:].sum())
@@ -336,6 +342,24 @@ class RecordedScenario(Scenario):
     def velocity(self, burn_in: int = 0) -> Floats:
         """The velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s: the reference's, else the clean run's."""
         return self.true_velocity[self._first(burn_in) : self.last + 1]
+
+    def velocity_in_steps(self) -> Floats:
+        """The velocity at the moments of the timeline's steps, (M+1, 3), ENU, m/s.
+
+        Between epochs it is that of the inertial samples, which a straight line in time leads from the velocity at one
+        epoch to that at the next.
+        """
+        moments, _, epochs = self.timeline.steps
+        velocity = np.empty((len(moments), 3))
+        velocity[epochs] = self.velocity()
+        for k in np.flatnonzero(np.diff(epochs) > 1).tolist():
+            inside, ends = moments[epochs[k] + 1 : epochs[k + 1]], self.timeline.times[[k, k + 1]]
+            time, coasting = coast(self.model, self.clean, self.first + k + 1)
+            amiss = velocity[epochs[[k, k + 1]]] - coasting[[0, -1]]
+            for a in range(3):
+                between = np.interp(inside, time, coasting[:, a]) + np.interp(inside, ends, amiss[:, a])
+                velocity[epochs[k] + 1 : epochs[k + 1], a] = between
+        return velocity
 
     def track(self) -> Floats:
         """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""

@@ -15,7 +15,7 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.closed_loop import mechanize_epoch
+from spoofgym.navigation.closed_loop import mechanize_part
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
@@ -130,6 +130,7 @@ class RecordedRanges(RecordedScenario):
         return replace(
             steady,
             time=ranges.time,
+            intervals=np.diff(ranges.time, prepend=self.align_time),
             started=ranges.started,
             noise_variance=np.where(np.tile(ranges.geometry.present, 2), sigma**2, 1.0),
         )
@@ -166,11 +167,12 @@ class RecordedRanges(RecordedScenario):
         Without a reference, or with one that has holes, it runs twice: along the fixes of the ranges there, and along
         its own first solution, so that a game, whose reference is the clean run, has the same lines of sight.
         """
-        run = self._clean_along(self.model)
-        if self.log.reference is None or not self.compared.all():
-            position, velocity = self._known(0, run.position[1:]), self._known(1, run.velocity[1:])
-            run = self._clean_along(replace(self.model, true_position=position, true_velocity=velocity))
-        self._check_clean(run)
+        with self._refusing_divergence():
+            run = self._clean_along(self.model)
+            if self.log.reference is None or not self.compared.all():
+                position, velocity = self._known(0, run.position[1:]), self._known(1, run.velocity[1:])
+                run = self._clean_along(replace(self.model, true_position=position, true_velocity=velocity))
+        self._warn_of_large_innovations(run)
         return run
 
     def _clean_along(self, model: StrapdownModel) -> TightCleanRun:
@@ -211,27 +213,34 @@ class RecordedRanges(RecordedScenario):
         transition = np.empty((stop - first, NUM_NAVIGATION, NUM_STATES))
         noise = np.empty((stop - first, NUM_NAVIGATION, NUM_NAVIGATION))
         density = np.diag(model.filter_density[:NUM_NAVIGATION])
+        bounds, places = model.parts
+        one = np.empty((NUM_NAVIGATION, NUM_STATES))
         for k in range(first, stop):
             attitude, velocity, position = clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy()
-            interval = mechanize_epoch(
-                model.boundaries[k],
-                model.boundaries[k + 1],
-                0,
-                -clean.bias[k],
-                np.empty(0),
-                model.angular_rate,
-                model.specific_force,
-                model.step,
-                model.true_noise,
-                attitude,
-                velocity,
-                position,
-                np.empty((6, 3)),
-                np.empty(3),
-                transition[k - first],
-            )
-            phi, half = transition[k - first, :, :NUM_NAVIGATION], 0.5 * interval * density
-            noise[k - first] = phi @ half @ phi.T + half
+            total, gathered = np.eye(NUM_NAVIGATION, NUM_STATES), np.zeros((NUM_NAVIGATION, NUM_NAVIGATION))
+            for part in range(places[k], places[k + 1]):
+                length = mechanize_part(
+                    bounds[part],
+                    bounds[part + 1],
+                    -1,
+                    -clean.bias[k],
+                    np.empty(0),
+                    model.angular_rate,
+                    model.specific_force,
+                    model.step,
+                    model.true_noise,
+                    attitude,
+                    velocity,
+                    position,
+                    np.empty((6, 3)),
+                    np.empty(3),
+                    one,
+                )
+                phi, half = one[:, :NUM_NAVIGATION], 0.5 * length * density
+                total = phi @ total
+                total[:, NUM_NAVIGATION:] += one[:, NUM_NAVIGATION:]
+                gathered = phi @ (gathered + half) @ phi.T + half
+            transition[k - first], noise[k - first] = total, gathered
         return transition, noise
 
     def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:

@@ -14,6 +14,7 @@ from spoofgym import validation
 from spoofgym.navigation.adaptation import Adaptation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import SimulatedScenario
+from spoofgym.scenarios.limits import RATES, SPEEDS
 from spoofgym.sensors.imu import grade
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.specification import spell
@@ -87,15 +88,15 @@ def shadmehri_flight(
     owner = "shadmehri-flight"
     validation.one_of(owner, "filter", filter, FILTERS)
     validation.one_of(owner, "noise", noise, NOISES)
-    validation.above(owner, "speed", speed)
-    validation.above(owner, "rate", rate)
+    speed = validation.between(owner, "speed", speed, *SPEEDS)
+    rate = validation.between(owner, "rate", rate, *RATES)
     if filter == "common" and (window is not None or guard is not None):
         raise ValueError(f"{owner}: window and guard are of filter 'self-tuning', got filter 'common'")
     default, white = Adaptation(), noise == "white"
-    window = default.window if window is None else window
-    guard = default.guard if guard is None else guard
+    window = default.window if window is None else validation.epochs(owner, "window", window)
+    guard = default.guard if guard is None else validation.text(owner, "guard", guard)
     first = 2.0 / rate
-    start = first if onset is None else validation.finite(owner, "onset", onset)
+    start = first if onset is None else validation.above(owner, "onset", onset)
     return SimulatedScenario(
         name=spell(
             owner,
@@ -117,7 +118,7 @@ def shadmehri_flight(
         ),
         tuning=FilterTuning(measurement_sigma=SIGMA),
         onset=start,
-        horizon=round((DURATION - start) * rate),
+        horizon=math.floor((DURATION - start) * rate + 1e-6),
         drag_off_rate=(5.0, 5.0, 5.0),
         error_scale=10.0,
         defender_scale=10.0,

@@ -17,7 +17,7 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
-from spoofgym.navigation.credible import AuxiliaryRule, CredibleModel, CredibleNavigator
+from spoofgym.navigation.credible import ANCHORING, AuxiliaryRule, CredibleModel, CredibleNavigator
 from spoofgym.navigation.credible_filter import CredibleTuning, credible_linear_model, standing_start
 from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
 from spoofgym.navigation.interface import Demands, Timeline
@@ -25,6 +25,7 @@ from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G
 from spoofgym.sensors.odometer import GRADES, Odometer, OdometerGrade, PlanarMotion, odometer_grade
 from spoofgym.sensors.receiver import Receiver, draw_noise
@@ -141,7 +142,7 @@ class SongRobot(Scenario):
     @property
     def timeline(self) -> Timeline:  # type: ignore[override]
         """The epochs of the game."""
-        return Timeline(self.onset, self.receiver.interval, self.horizon)
+        return Timeline.steady(self.onset, self.receiver.interval, self.horizon)
 
     @property
     def bias_sigma(self) -> Floats:
@@ -171,7 +172,7 @@ class SongRobot(Scenario):
     def times(self, burn_in: int) -> Floats:
         """Scenario time of the epochs -burn_in..K, s."""
         start = self.onset - burn_in * self.receiver.interval
-        return Timeline(start, self.receiver.interval, self.horizon + burn_in).times
+        return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
 
     @kept_by_burn_in
     def motion(self, burn_in: int = 0) -> PlanarMotion:
@@ -267,10 +268,13 @@ def song_robot(
     validation.one_of(owner, "data", data, DATA)
     validation.one_of(owner, "noise", noise, NOISES)
     validation.one_of(owner, "odometer", odometer, tuple(GRADES))
-    sigma = validation.above(owner, "sigma", sigma)
-    horizon = validation.whole(owner, "horizon", horizon, 1)
+    sigma = validation.between(owner, "sigma", sigma, *SIGMAS)
+    horizon = validation.whole(owner, "horizon", horizon, 1, MOST_EPOCHS)
     onset = validation.finite(owner, "onset", onset)
-    rule = AuxiliaryRule(anchoring=auxiliary, credit=credit)
+    rule = AuxiliaryRule(
+        anchoring=validation.one_of(owner, "auxiliary", auxiliary, ANCHORING),
+        credit=validation.epochs(owner, "credit", credit),
+    )
     if auxiliary != "credited" and credit != 5:
         raise ValueError(f"{owner}: credit {credit} is of auxiliary 'credited', got auxiliary {auxiliary!r}")
     white = sigma if noise == "white" else WHITE_SHARE * sigma

@@ -82,7 +82,9 @@ class Confounders:
                 self.noise[run, stretch, :3] = (low + draws[6] * (high - low)) * normals[stretch]
 
     def _stretch(self, place: float, length: float, duration: tuple[float, float]) -> slice:
-        """Epochs of a disturbance that begins anywhere after epoch 0 and may last beyond the end."""
+        """Epochs of a disturbance that begins at any of them after epoch 0 and may last beyond the end."""
         seconds = duration[0] + length * (duration[1] - duration[0])
+        times, interval = self._timeline.times, self._timeline.interval
         first = 1 + int(place * self._timeline.num_epochs)
-        return slice(first, first + max(1, round(seconds / self._timeline.interval)))
+        last = int(np.searchsorted(times, times[first] + seconds - 0.5 * interval))
+        return slice(first, max(first + 1, last))

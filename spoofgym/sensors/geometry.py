@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.constants import speed_of_light
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import ecef_to_enu_rotation, geodetic_to_ecef
+from spoofgym.kernels import njit
 from spoofgym.sensors.constellation import EARTH_RATE
 from spoofgym.sensors.constellation import Constellation as Constellation
 

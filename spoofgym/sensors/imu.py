@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
 DEGREE_PER_ROOT_HOUR = math.pi / 180.0 / 60.0
@@ -182,15 +182,25 @@ GRADES = {
 }
 
 
-def grade(name: str) -> ImuGrade:
+def grade(name: object) -> ImuGrade:
     """The grade of this name.
 
     Raises:
         ValueError: unknown; the message lists the valid names.
     """
-    if name not in GRADES:
-        raise ValueError(f"unknown IMU grade {name!r}; valid grades: {', '.join(GRADES)}")
+    if not isinstance(name, str) or name not in GRADES:
+        raise ValueError(f"unknown IMU grade {validation.shown(name)}; valid grades: {', '.join(GRADES)}")
     return GRADES[name]
+
+
+def require_grade(owner: str, option: str, name: str) -> None:
+    """Refuse the value of an option that names no grade.
+
+    Raises:
+        ValueError: naming owner, option and the valid names.
+    """
+    with validation.argument(owner, option):
+        grade(name)
 
 
 @njit(cache=True, nogil=True)

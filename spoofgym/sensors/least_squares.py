@@ -12,10 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.geodesy import ecef_to_geodetic, geodetic_to_ecef
+from spoofgym.kernels import njit
 from spoofgym.sensors.geometry import invert_normal, lines_of_sight, normal_inverse
 
 ITERATIONS = 20

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.constants import speed_of_light
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
 from spoofgym.geodesy import geodetic_to_ecef
+from spoofgym.kernels import njit
 from spoofgym.sensors.geometry import SatelliteGeometry
 from spoofgym.sensors.imu import gauss_markov_step
 

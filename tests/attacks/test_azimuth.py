@@ -114,7 +114,7 @@ def test_azimuth_grows_exponentially_and_decays_likewise():
 
 def test_straight_on_a_constant_azimuth_is_a_chord_of_the_circle():
     """A long growth is nearly linear, so that the offset across a straight drive at v is v A t² / (2 N)."""
-    timeline = Timeline(0.0, 0.1, 500)
+    timeline = Timeline.steady(0.0, 0.1, 500)
     attack = make_attack("azimuth:0.5,growth=1000")
     attack.bind(timeline, 1)
     attack.follow(np.broadcast_to([0.0, 20.0, 0.0], (501, 3)))
@@ -144,9 +144,9 @@ def test_fixes_are_true_until_the_onset_and_after_the_end(drive, number):
 def test_an_attack_that_cannot_end_is_refused_when_the_game_is_known():
     attack = make_attack("azimuth:5,end=15")
     with pytest.raises(ValueError, match=r"end must be later than the onset at 20 s, got 15\.0"):
-        attack.bind(Timeline(20.0, 1.0, 230), 1)
+        attack.bind(Timeline.steady(20.0, 1.0, 230), 1)
     with pytest.raises(ValueError, match="onset 95 s lies outside the game"):
-        make_attack("foi-1").bind(Timeline(20.0, 1.0, 60), 1)
+        make_attack("foi-1").bind(Timeline.steady(20.0, 1.0, 60), 1)
 
 
 @pytest.mark.parametrize(

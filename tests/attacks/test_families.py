@@ -8,7 +8,7 @@ from spoofgym.attacks import AttackPool, RandomJump, make_attack
 from spoofgym.navigation.interface import Clock, Timeline, manoeuvre_times
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(20.0, 1.0, 230)
+TIMELINE = Timeline.steady(20.0, 1.0, 230)
 TRAINING = ["random-ramp", "random-jump", "random-growth"]
 HELD_OUT = ["two-stage-ramp", "sign-changing-ramp", "decaying-jump", "climbing-spiral"]
 FAMILIES = [*TRAINING, *HELD_OUT]
@@ -182,7 +182,7 @@ def test_headings_are_uniform(jumps):
 def test_manoeuvres_are_found():
     assert manoeuvre_times(TURNING, TIMELINE) == (110.0, 165.0)
     assert manoeuvre_times(STAY, TIMELINE) == ()
-    assert manoeuvre_times(TURNING[95:], Timeline(115.0, 1.0, 135)) == (165.0,)
+    assert manoeuvre_times(TURNING[95:], Timeline.steady(115.0, 1.0, 135)) == (165.0,)
 
 
 @pytest.mark.parametrize(("interval", "pause", "times"), [(1.0, 1, 1), (1.0, 2, 2), (0.5, 3, 1), (0.5, 4, 2)])
@@ -192,7 +192,7 @@ def test_a_manoeuvre_is_a_new_one_after_two_quiet_seconds(interval, pause, times
     speed = np.concatenate([[20.0], 20.0 + np.cumsum(gains)])
     velocity = np.stack([np.zeros_like(speed), speed, 10.0 * speed], axis=1)
     expected = 100.0 + interval * np.array([5.0, 9.0 + pause])
-    assert manoeuvre_times(velocity, Timeline(100.0, interval, len(gains))) == tuple(expected[:times])
+    assert manoeuvre_times(velocity, Timeline.steady(100.0, interval, len(gains))) == tuple(expected[:times])
 
 
 def test_a_share_begins_in_view_of_a_manoeuvre():
@@ -251,4 +251,4 @@ def test_the_name_builds_the_same_family(name):
 
 def test_a_game_of_twenty_seconds_is_too_short():
     with pytest.raises(ValueError, match="needs a game of more than 20 s"):
-        make_attack("random-ramp").bind(Timeline(0.0, 1.0, 20), 1)
+        make_attack("random-ramp").bind(Timeline.steady(0.0, 1.0, 20), 1)

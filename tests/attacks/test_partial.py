@@ -8,7 +8,7 @@ from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
-TIMELINE = Timeline(start=20.0, interval=0.5, num_epochs=40)
+TIMELINE = Timeline.steady(start=20.0, interval=0.5, num_epochs=40)
 FLIGHT = make_scenario("kujur-flight:onset=60,horizon=20")
 SATELLITES = np.array([[4, -1, 17, 2, 9], [-1, -1, 9, 3, 17]])
 

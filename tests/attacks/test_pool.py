@@ -11,7 +11,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(20.0, 1.0, 60)
+TIMELINE = Timeline.steady(20.0, 1.0, 60)
 FALSE_FAILURE = 1e-8
 MEMBERS = {
     "training": ("random-ramp", "random-jump", "random-growth"),

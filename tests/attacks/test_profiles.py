@@ -8,7 +8,7 @@ from spoofgym.attacks import ATTACKS, Jump, JumpRamp, Ramp, make_attack
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(start=800.0, interval=1.0, num_epochs=120)
+TIMELINE = Timeline.steady(start=800.0, interval=1.0, num_epochs=120)
 RANDOM = ["jump", "slow-change"]
 
 
@@ -64,7 +64,7 @@ def test_ramp_starts_at_its_onset():
 
 
 def test_ramp_counts_time_not_epochs():
-    timeline = Timeline(20.0, 0.1, 50)
+    timeline = Timeline.steady(20.0, 0.1, 50)
     np.testing.assert_allclose(offsets_of(bound("ramp:2", timeline=timeline), timeline=timeline)[5, 0, 0], 1.0)
 
 
@@ -83,7 +83,7 @@ def test_runs_stand_at_epochs_of_their_own():
 
 @pytest.mark.parametrize(("start", "interval", "epoch"), [(20.0, 0.1, 3), (0.3, 0.1, 6), (100.0, 1 / 3, 50)])
 def test_rounding_of_time_does_not_move_a_jump(start, interval, epoch):
-    timeline = Timeline(start, interval, 100)
+    timeline = Timeline.steady(start, interval, 100)
     exact = start + interval * epoch
     for onset in (exact, np.nextafter(exact, 0.0), np.nextafter(exact, 1e9)):
         for attack in (Jump(onset=onset), JumpRamp(rate=0.0, jump=1.0, onset=onset)):
@@ -119,7 +119,7 @@ def test_slow_change_adds_a_disturbance_every_second():
 
 
 def test_slow_change_at_ten_hertz_is_that_of_one_hertz_with_straight_seconds():
-    fast = Timeline(800.0, 0.1, 1200)
+    fast = Timeline.steady(800.0, 0.1, 1200)
     coarse = offsets_of(bound("slow-change"))[:, 0]
     fine = offsets_of(bound("slow-change", timeline=fast), timeline=fast)[:, 0]
     for axis in range(3):
@@ -160,7 +160,7 @@ def test_an_end_before_the_onset_is_refused(end):
 
 @pytest.mark.parametrize(("start", "interval"), [(20.0, 0.1), (0.3, 0.1), (100.0, 1 / 3)])
 def test_rounding_of_time_does_not_move_an_end(start, interval):
-    timeline = Timeline(start, interval, 100)
+    timeline = Timeline.steady(start, interval, 100)
     exact = start + interval * 6
     for end in (exact, np.nextafter(exact, 0.0), np.nextafter(exact, 1e9)):
         attack = Jump(end=end)

@@ -10,7 +10,7 @@ from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
-TIMELINE = Timeline(start=20.0, interval=0.5, num_epochs=120)
+TIMELINE = Timeline.steady(start=20.0, interval=0.5, num_epochs=120)
 CARRIER = make_scenario("kujur-flight:onset=60,horizon=40")
 RATE = make_scenario("liu-flight:coupling=tight,onset=200,horizon=40")
 

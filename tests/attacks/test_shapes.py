@@ -10,7 +10,7 @@ from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(start=800.0, interval=1.0, num_epochs=120)
+TIMELINE = Timeline.steady(start=800.0, interval=1.0, num_epochs=120)
 NORTH = np.broadcast_to([0.0, 10.0, 0.0], (121, 3))
 TIMES = np.arange(121.0)
 LATE = [
@@ -82,7 +82,7 @@ def test_fusion_ripper_stays_at_its_limit():
 
 
 def test_fusion_ripper_counts_seconds_not_fixes():
-    fast = Timeline(800.0, 0.1, 1200)
+    fast = Timeline.steady(800.0, 0.1, 1200)
     fine = offsets_of(bound("fusion-ripper:2", np.broadcast_to([0.0, 10.0, 0.0], (1201, 3)), fast), fast)
     np.testing.assert_allclose(fine[::10], offsets_of(bound("fusion-ripper:2")))
 
@@ -136,7 +136,7 @@ def test_meaconing_is_the_track_itself_at_whole_delays():
 
 
 def test_the_path_hits_its_epochs_at_any_interval():
-    timeline = Timeline(3.0, 0.1, 50)
+    timeline = Timeline.steady(3.0, 0.1, 50)
     velocity = np.random.default_rng(0).normal(size=(51, 3))
     positions = path(velocity, timeline, timeline.times)
     expected = np.cumsum(0.05 * (velocity[1:] + velocity[:-1]), axis=0)

@@ -5,7 +5,7 @@ from spoofgym.attacks import make_attack
 from spoofgym.navigation.interface import Clock, Timeline
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(0.0, 1.0, 300)
+TIMELINE = Timeline.steady(0.0, 1.0, 300)
 
 
 def bound(num_runs=1, seed=0, timeline=TIMELINE):
@@ -55,4 +55,4 @@ def test_the_name_builds_it():
 
 def test_a_game_that_is_too_short_is_refused():
     with pytest.raises(ValueError, match="onset 150 s lies outside the game, which runs from 0 s to 120 s"):
-        bound(timeline=Timeline(0.0, 1.0, 120))
+        bound(timeline=Timeline.steady(0.0, 1.0, 120))

@@ -12,7 +12,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(start=20.0, interval=1.0, num_epochs=120)
+TIMELINE = Timeline.steady(start=20.0, interval=1.0, num_epochs=120)
 NORTH = np.broadcast_to([0.0, 10.0, 0.0], (121, 3))
 
 

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks import make_attack
-from spoofgym.detectors import make_detector
+from spoofgym.clean_statistics import joint_statistics, white_statistics
+from spoofgym.detectors import Ensemble, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.ring import Ring
 from spoofgym.navigation.interface import Epoch, Innovation
+from spoofgym.responses import make_response
+from spoofgym.responses.watching import Watching
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
@@ -173,3 +176,75 @@ def test_simulation_refuses():
     short.resolve()
     with pytest.raises(RuntimeError, match="run 0 has reached its last epoch: reset it"):
         short.observe()
+
+
+class Giving(Detector):
+    """A user's detector that gives something else from its fourth epoch on."""
+
+    name = "giving"
+
+    def __init__(self, given, threshold=100.0):
+        self.given, self.threshold = given, threshold
+
+    def bind(self, num_runs, dimension):
+        self.count = 0
+
+    def update(self, epoch):
+        self.count += 1
+        return epoch.innovation.nis if self.count <= 3 else self.given
+
+
+BLIND = [
+    (np.array([1.0, np.nan, 2.0]), r"'giving': update must return numbers, .* it returned nan in run 1, which exceeds"),
+    (np.array([1.0, 1.0, -np.inf]), r"'giving': .* it returned -inf in run 2"),
+    (np.zeros(2), r"'giving': .* 3 runs, real numbers in an array of shape \(3,\), got float64 of shape \(2,\)"),
+    (np.zeros((3, 1)), r"'giving': .* got float64 of shape \(3, 1\)"),
+    (np.zeros(3, dtype=complex), r"'giving': .* got complex128 of shape \(3,\)"),
+    (np.array(["1", "2", "3"]), r"'giving': .* got <U1 of shape \(3,\)"),
+    (1.5, r"'giving': .* got 1.5"),
+    (None, r"'giving': .* got None"),
+    ([[1.0], [1.0, 2.0], [3.0]], r"'giving': .* got \[\[1.0\], \[1.0, 2.0\], \[3.0\]\]"),
+]
+
+
+def played(detectors):
+    """Five epochs of three runs."""
+    simulation = Simulation(make_scenario("liu-flight:horizon=9,onset=300"), None, detectors, None, 3, seed=0)
+    simulation.reset()
+    for _ in range(5):
+        simulation.resolve()
+        simulation.observe()
+    return simulation
+
+
+@pytest.mark.parametrize(("given", "message"), BLIND)
+def test_a_blind_detector_is_refused_by_its_name(given, message):
+    with pytest.raises(ValueError, match=message):
+        played([Giving(given)])
+    with pytest.raises(ValueError, match=message):
+        played([Ensemble([Giving(given), make_detector("snapshot")], 1.0)])
+    clean = white_statistics(np.eye(3), 10)
+    with pytest.raises(ValueError, match=message):
+        clean(Giving(given), 3, np.random.default_rng(0))
+    with pytest.raises(ValueError, match=message):
+        joint_statistics(make_scenario("liu-flight:horizon=9,onset=300"), "linear")(
+            [Giving(given)], 3, np.random.default_rng(0)
+        )
+
+
+@pytest.mark.parametrize("given", [[1, 200, 3], np.array([1, 200, 3], dtype=np.float32), np.array([1.0, np.inf, 3.0])])
+def test_other_real_numbers_are_taken_as_they_are(given):
+    simulation = played([Giving(given)])
+    assert simulation.alarm.tolist() == [False, True, False]
+    assert simulation.epoch.statistics["giving"].dtype == np.float64
+
+
+@pytest.mark.parametrize("threshold", [np.nan, np.inf, -np.inf, 0.0, -1.0, "3", np.array([1.0, 2.0])])
+def test_a_threshold_that_decides_nothing_is_refused(threshold):
+    message = r"detector 'giving': threshold must be a finite number greater than 0, got "
+    with pytest.raises(ValueError, match=message):
+        played([Giving(np.zeros(3), threshold)])
+    with pytest.raises(ValueError, match=message):
+        played([Ensemble([Giving(np.zeros(3), threshold), make_detector("snapshot")], 1.0)])
+    with pytest.raises(ValueError, match=message):
+        Watching(make_response("exclude"), "giving", [Giving(np.zeros(3), threshold)])

@@ -102,7 +102,7 @@ def plain(world, use):
 def test_the_games_have_everything_in_them(played):
     games = played["never"]
     assert games.error.shape == (EPISODES, EPOCHS)
-    assert games.interval == 1.0
+    assert games.timeline.interval == 1.0
     assert (games.member == -1).any()
     assert set(games.member[games.member >= 0]) == set(range(len(games.names)))
     assert not games.available.all()
@@ -247,7 +247,7 @@ def test_a_policy_may_be_trained_on_other_games(world, played):
 
 @pytest.mark.parametrize("play", [play_never, play_always, play_random, play_oracle_onset])
 def test_no_episodes_are_refused(world, play):
-    with pytest.raises(ValueError, match="episodes must be 1 or more, got 0"):
+    with pytest.raises(ValueError, match="episodes must be a whole number, 1 or more, got 0"):
         play(world, 0, SEED)
 
 

@@ -19,6 +19,7 @@ from spoofgym.evaluation.defence_metrics import (
     paired_difference,
     time_to_reuse,
 )
+from spoofgym.navigation.interface import Timeline
 
 EPOCHS = 60
 
@@ -41,7 +42,8 @@ def game(attacked=(), excluded=(), outage=(), multipath=(), error=1.0):
 def episodes(*games, interval=1.0):
     error, excluded, available, attacked, clean = (np.array(column) for column in zip(*games, strict=True))
     member = np.where(attacked.any(axis=1), 0, -1)
-    return DefenceEpisodes(error * 1.0, excluded, available, attacked, clean, member, ("ramp",), interval)
+    timeline = Timeline.steady(20.0, interval, EPOCHS)
+    return DefenceEpisodes(error * 1.0, excluded, available, attacked, clean, member, ("ramp",), timeline)
 
 
 def score(*games, interval=1.0):

@@ -10,6 +10,7 @@ from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import attacker_score, mean_interval, undetected_error
 from spoofgym.evaluation.monte_carlo import NEVER, Episodes, play_attack
+from spoofgym.navigation.interface import Timeline
 from spoofgym.optimum import best_ramp, expected_play
 from spoofgym.scenarios import make_scenario
 
@@ -17,7 +18,8 @@ from spoofgym.scenarios import make_scenario
 def episodes(alarm_epoch, interval=1.0):
     alarm_epoch = np.array(alarm_epoch)
     n = len(alarm_epoch)
-    return Episodes(alarm_epoch, np.full(n, 3.0), np.arange(n, dtype=float), np.zeros(n, dtype=int), interval)
+    timeline = Timeline.steady(20.0, interval, 10)
+    return Episodes(alarm_epoch, np.full(n, 3.0), np.arange(n, dtype=float), np.zeros(n, dtype=int), timeline)
 
 
 def test_a_detected_game_counts_zero():
@@ -96,5 +98,5 @@ def test_random_rates_stay_within_the_limits():
 
 
 def test_no_episodes_are_refused():
-    with pytest.raises(ValueError, match="episodes must be 1 or more, got 0"):
+    with pytest.raises(ValueError, match="episodes must be a whole number, 1 or more, got 0"):
         play_attack(make_scenario("liu-flight"), make_attack("none"), [make_detector("snapshot")], 0, 0)

@@ -18,7 +18,7 @@ from spoofgym.navigation.interface import Clock, Timeline
 
 def test_it_jumps_waits_and_drags_off():
     spoofer = PatientSpoofer(jump=40.0, patience=8.0, rate=2.0, direction=0.0, onset=105.0)
-    spoofer.bind(Timeline(100.0, 1.0, 50), 1)
+    spoofer.bind(Timeline.steady(100.0, 1.0, 50), 1)
     time = np.array([100.0, 105.0, 106.0, 113.0, 114.0, 123.0])
     offset = np.array([spoofer.offset(Clock(np.array([int(t) - 100]), np.array([t])))[0] for t in time])
     assert offset[:, 1].tolist() == [0.0, 0.0, 40.0, 40.0, 42.0, 60.0]

@@ -9,10 +9,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.linalg import solve_triangular
 
 from spoofgym.attacks.profiles import Ramp
+from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import navigation_dynamics, transition_matrix
 from spoofgym.navigation.interface import Clock, Decision, Demands
 from spoofgym.parallel import RunSlices
@@ -26,7 +26,7 @@ RUNS = 4
 SEED = 50
 
 
-@njit
+@njit(cache=True)
 def carry(attitude, velocity, position, force, errors, step, noise):
     """Error at the end of an epoch from the sample errors (n, 6) of angular rate and specific force; noise (9,)."""
     dynamics, work = np.empty((9, 9)), np.empty((2, 9, 9))

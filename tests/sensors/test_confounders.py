@@ -11,7 +11,7 @@ from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
 
-TIMELINE = Timeline(20.0, 1.0, 230)
+TIMELINE = Timeline.steady(20.0, 1.0, 230)
 FALSE_FAILURE = 1e-8
 RUNS = 4000
 OUTAGES = Disturbances(outage_share=1.0, multipath_share=0.0)
@@ -80,7 +80,7 @@ def test_place_and_length_are_uniform(disturbances, shortest, longest):
 def test_a_length_in_seconds_becomes_epochs(interval, epochs):
     """Rounded to whole epochs, at least one."""
     given = Disturbances(outage_share=1.0, outage_duration=(12.0, 12.0), multipath_share=0.0)
-    first, length = stretches(~drawn(given, 300, timeline=Timeline(0.0, interval, 300)).available)
+    first, length = stretches(~drawn(given, 300, timeline=Timeline.steady(0.0, interval, 300)).available)
     np.testing.assert_array_equal(length, np.minimum(epochs, 301 - first))
 
 
@@ -122,7 +122,7 @@ def test_the_sigma_of_a_burst_is_uniform():
 
 def test_there_is_always_a_fix_at_epoch_0():
     given = Disturbances(outage_share=1.0, multipath_share=1.0)
-    confounders = drawn(given, timeline=Timeline(0.0, 1.0, 3))
+    confounders = drawn(given, timeline=Timeline.steady(0.0, 1.0, 3))
     assert confounders.available[:, 0].all()
     assert not confounders.multipath[:, 0].any()
     assert not np.any(confounders.noise[:, 0])

@@ -1,0 +1,41 @@
+"""The numerical tests in the arithmetic of another processor: ``python -m tests.other_kernels [options of pytest]``.
+
+OpenBLAS, NumPy and numba choose their code by the processor, and each code rounds in its own way. Here all three take
+that for the oldest ones: short vectors, no fused multiply-add. A tolerance that only this machine's code meets, or two
+results that are equal by its luck, then fail. A variable that is set stays as it is, to try another processor:
+``OPENBLAS_CORETYPE=Haswell``.
+"""
+
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+NOT_NUMERICAL = ("train", "agents", "kernels", "test_package.py", "test_readme.py", "test_tutorial.py")
+"""Left out: programs, learners and files. All else is numerical, what is added to `tests/` included."""
+OLDEST = {"x86_64": "Nehalem", "amd64": "Nehalem", "aarch64": "ARMV8", "arm64": "ARMV8"}
+
+
+def other_kernels() -> dict[str, str]:
+    """The variables that choose the code for the oldest processors of this machine's kind."""
+    extensions = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return {
+        "NUMBA_CPU_NAME": "generic",
+        "OPENBLAS_CORETYPE": OLDEST.get(platform.machine().lower(), ""),
+        "NPY_DISABLE_CPU_FEATURES": " ".join(extensions),
+    }
+
+
+def main() -> int:
+    """Run pytest; its exit status."""
+    left_out = [f"--ignore=tests/{name}" for name in NOT_NUMERICAL]
+    command = [sys.executable, "-m", "pytest", *left_out, *(sys.argv[1:] or ["tests"])]
+    return subprocess.run(command, cwd=ROOT, env={**other_kernels(), **os.environ}, check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

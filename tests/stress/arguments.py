@@ -1,0 +1,389 @@
+"""Hostile arguments: whatever a person gives is either played, with finite numbers and no warning, or refused by name.
+
+Parts and their parameters are taken from the registries and signatures, so that new ones are tried without a word here.
+``fuzz(seed, tries)`` gives the broken promises, one text each.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from decimal import Decimal
+from functools import cache
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from spoofgym.attacks import ATTACKS, make_attack
+from spoofgym.attacks.base import Attack
+from spoofgym.detectors import DETECTORS, make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import DefenderConfig, SpooferConfig
+from spoofgym.envs.defender import DefenderEnv
+from spoofgym.envs.spoofer import SpooferEnv
+from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
+from spoofgym.navigation.facts import RANGES
+from spoofgym.parallel import RunSlices
+from spoofgym.responses import RESPONSES, make_response
+from spoofgym.responses.base import Response
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios import SCENARIOS, make_scenario
+from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
+
+LOOSE, TIGHT, LONG = "liu-flight:horizon=12", "kujur-flight:horizon=12,onset=60", "foi-drive:horizon=30"
+UNMATCHED = "foi-drive:receiver=foi,onset=60,horizon=12"
+LONG_TIGHT = "kujur-flight:horizon=60,onset=60"
+STEPS = 4
+REFUSED = (ValueError, TypeError)
+
+NUMBERS: tuple[Any, ...] = (
+    float("nan"), float("inf"), float("-inf"), 0, 0.0, -0.0, -1, -1.0, 0.5, 1.5, 1, 2, 3.0, 1e-300, -1e-300, 5e-324,
+    1e300, -1e300, 1.7e308, 1e160, 1e19, 1e9, -1e9, 10**30, -(10**30), 10**400, 99999999, 2**63, 2**64, 100001,
+    np.float64("nan"), np.float32(1e30), np.float16(2.0), np.int64(-3), np.int64(2), np.uint64(2**63), np.longdouble(2),
+    np.array(2.0), np.array(float("nan")), np.array([1.0, 2.0]), np.array([]), Decimal("2"), Decimal("NaN"),
+)  # fmt: skip
+OTHERS: tuple[Any, ...] = (
+    True, False, np.bool_(True), None, "", " ", "x", "90", "nan", "1e300", "\0", "x" * 10_000, "9" * 5000, b"5", [],
+    [1], [[]], (), (1, 2), {}, {"a": 1}, set(), 1j, np.complex128(1 + 1j), np.array(1j), np.array(["x"]),
+    np.array([None, 1], dtype=object), object(), int, range(3), len, np.datetime64("2020-01-01"), Ellipsis,
+)  # fmt: skip
+TEXTS = (
+    "nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "5e-324", "1e400", "-1", "-0", "0", "0.5", "1", "2", "1e9",
+    "1e19", "99999999", "100001", "9" * 5000, "0x10", "1_0", "true", "false", "none", "x", "é", "٣", "x" * 5000, "1+1",
+    "5+20", "a/b", "~", "+", "/", "ramp/1", "ramp:nan", "ramp:1e300", "ramp:1/onset=1e9",
+    "snapshot+windowed", "'", "\\", "\t", "",
+)  # fmt: skip
+EXPONENTS = ((-300, 300), (-12, 12), (-6, 6), (-2, 2))
+ACTIONS: tuple[Any, ...] = (
+    None, "x", "", b"1", object(), [], {}, True, 1j, 1e19, 1e300, float("nan"), float("inf"), 10**30, -1, 0.5, 99,
+    np.float32(np.inf), np.longdouble("1e4000"), np.uint64(2**63),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Try:
+    """One try.
+
+    Attributes:
+        words: what was done, to do it again.
+        owners: one of these, and
+        arguments: one of these must stand in the message of a refusal.
+        build: makes the thing.
+        play: plays it.
+    """
+
+    words: str
+    owners: tuple[str, ...]
+    arguments: tuple[str, ...]
+    build: Callable[[], Any]
+    play: Callable[[Any], None]
+
+
+def fuzz(seed: int, tries: int) -> list[str]:
+    """Make tries; the broken promises."""
+    rng = np.random.default_rng(seed)
+    broken = []
+    for _ in range(tries):
+        attempt = GENERATORS[int(rng.integers(len(GENERATORS)))](rng)
+        if words := broken_promise(attempt):
+            broken.append(words)
+    return broken
+
+
+def broken_promise(attempt: Try) -> str | None:
+    """What is wrong with a try, if anything is."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            attempt.play(attempt.build())
+    except REFUSED as error:
+        message = str(error)
+        if _names(message, attempt.owners) and _names(message, attempt.arguments):
+            return None
+        wanted = f"{attempt.owners} and {attempt.arguments}"
+        return f"{attempt.words}: {type(error).__name__} that does not name {wanted}: {message[:300]}"
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        return f"{attempt.words}: {type(error).__name__}: {str(error)[:300]}"
+    return None
+
+
+def _names(message: str, names: tuple[str, ...]) -> bool:
+    return any(re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", message) for name in names)
+
+
+# --- values -----------------------------------------------------------------------------------------------------------
+
+
+def hostile(rng: np.random.Generator) -> Any:
+    """A value that nobody would give on purpose, or hardly."""
+    kind = rng.random()
+    if kind < 0.35:
+        return NUMBERS[int(rng.integers(len(NUMBERS)))]
+    if kind < 0.55:
+        return OTHERS[int(rng.integers(len(OTHERS)))]
+    if kind < 0.75:
+        return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*EXPONENTS[int(rng.integers(len(EXPONENTS)))]))
+    if kind < 0.9:
+        return float(10.0 ** rng.uniform(-9, 9))
+    return int(rng.integers(-10, 1000))
+
+
+def hostile_text(rng: np.random.Generator) -> str:
+    """A text that nobody would write after ``key=``."""
+    if rng.random() < 0.6:
+        return TEXTS[int(rng.integers(len(TEXTS)))]
+    if rng.random() < 0.3:
+        return str(int(rng.integers(-2, 1000)))
+    return repr(float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*EXPONENTS[int(rng.integers(len(EXPONENTS)))])))
+
+
+def _shown(value: object) -> str:
+    try:
+        return repr(value)[:60]
+    except ValueError:
+        return f"a {type(value).__name__}"
+
+
+# --- parts ------------------------------------------------------------------------------------------------------------
+
+MAKERS: dict[str, Callable[[Any], Any]] = {
+    "attack": make_attack,
+    "detector": make_detector,
+    "response": make_response,
+    "scenario": make_scenario,
+}
+KINDS: dict[str, tuple[dict[str, Callable[..., Any]], Callable[[Any], None]]] = {}
+
+
+def _parts(rng: np.random.Generator) -> Try:
+    kind = str(rng.choice(list(KINDS)))
+    registry, play = KINDS[kind]
+    names = [name for name in registry if inspect.signature(registry[name]).parameters and name != "recorded"]
+    name = str(rng.choice(names))
+    factory = registry[name]
+    parameters = list(inspect.signature(factory).parameters.values())
+    chosen = rng.choice(len(parameters), size=min(len(parameters), 1 + int(rng.random() < 0.2)), replace=False)
+    keys = [parameters[int(place)].name for place in chosen]
+    played = play if _fits(kind, name) else _nothing
+    if rng.random() < 0.5:
+        options = {p.name: _example(p) for p in parameters if p.default is p.empty}
+        options |= {key: hostile_text(rng) for key in keys}
+        text = f"{name}:" + ",".join(f"{key}={value}" for key, value in options.items())
+        named = (*keys, "specification", "member")
+        owners = (name, "specification", *_inner(name))
+        return Try(f"{kind} {text[:150]!r}", owners, named, lambda: MAKERS[kind](text), played)
+    given = {p.name: _example(p) for p in parameters if p.default is p.empty}
+    given |= {key: hostile(rng) for key in keys}
+    words = f"{kind} {name}({', '.join(f'{key}={_shown(value)}' for key, value in given.items())})"
+    return Try(words, (name, *_inner(name)), tuple(keys), lambda: factory(**given), played)
+
+
+def _inner(name: str) -> tuple[str, ...]:
+    """Owners that answer for the options of a part which they make up, or from which it is made."""
+    within = {
+        "ci": ("windowed",),
+        "kujur-monitor": ("cpi", "separation-bank"),
+        "training": ("random-ramp", "pool of attacks"),
+        "held-out": ("two-stage-ramp", "pool of attacks"),
+    }
+    return within.get(name, ())
+
+
+def _example(parameter: inspect.Parameter) -> Any:
+    """A good value of a parameter that must be given."""
+    return {"attack": "ramp:1", "members": "snapshot+rio"}.get(parameter.name, 2.0)
+
+
+@cache
+def _fits(kind: str, name: str) -> bool:
+    """Whether the part plays in the scenarios here at all."""
+    registry, play = KINDS[kind]
+    parameters = inspect.signature(registry[name]).parameters.values()
+    try:
+        play(registry[name](**{p.name: _example(p) for p in parameters if p.default is p.empty}))
+    except ValueError:
+        return False
+    return True
+
+
+def _nothing(part: Any) -> None:
+    """A part that does not fit is built only."""
+
+
+def _run(simulation: Simulation) -> None:
+    """A few epochs, all of whose numbers are finite."""
+    simulation.reset()
+    for _ in range(min(STEPS, simulation.scenario.timeline.num_epochs)):
+        simulation.resolve()
+        epoch = simulation.observe()
+        for values in (simulation.error, epoch.innovation.nis, *epoch.statistics.values(), simulation.offset):
+            assert np.all(np.isfinite(values)), "a number that is not finite"
+
+
+def _play_attack(attack: Attack) -> None:
+    scenario = make_scenario(TIGHT if attack.needs_ranges else LONG)
+    _run(Simulation(scenario, attack, [make_detector("snapshot")], None, 2, 1))
+
+
+def _play_detector(detector: Detector) -> None:
+    scenario = make_scenario(TIGHT if RANGES in detector.needs else LOOSE if detector.memory > 20 else UNMATCHED)
+    for member in (*detector.members, detector):
+        if member.lacks_slope:
+            member.set_slope(0.0)
+        if member.target_arl0 is not None:  # its calibration takes long
+            member.set_threshold(1e6)
+    _run(Simulation(scenario, make_attack("ramp:1"), [detector], None, 2, 1))
+
+
+def _play_response(response: Response) -> None:
+    scenario = make_scenario(TIGHT if response.needs else LOOSE)
+    _run(Simulation(scenario, make_attack("ramp:4"), [make_detector("snapshot:threshold=5")], response, 2, 1))
+
+
+def _play_scenario(scenario: Scenario) -> None:
+    _run(Simulation(scenario, make_attack("ramp:1"), [make_detector("snapshot")], None, 2, 1))
+
+
+KINDS |= {
+    "attack": (ATTACKS, _play_attack),
+    "detector": (DETECTORS, _play_detector),
+    "response": (RESPONSES, _play_response),
+    "scenario": (SCENARIOS, _play_scenario),
+}
+
+# --- environments -----------------------------------------------------------------------------------------------------
+
+ENVIRONMENTS: tuple[tuple[type, type, dict[str, Any]], ...] = (
+    (SpooferEnv, SpooferConfig, {"scenario": LOOSE}),
+    (SpooferVectorEnv, SpooferConfig, {"scenario": LOOSE, "num_envs": 2}),
+    (DefenderEnv, DefenderConfig, {"scenario": LONG, "detectors": "snapshot"}),
+    (DefenderVectorEnv, DefenderConfig, {"scenario": LONG, "detectors": "snapshot", "num_envs": 2}),
+    (SpooferEnv, SpooferConfig, {"scenario": TIGHT}),
+    (DefenderVectorEnv, DefenderConfig, {"scenario": LONG_TIGHT, "detectors": "snapshot", "num_envs": 2}),
+)
+OF_VECTORS = ("num_envs", "autoreset_mode", "max_episode_steps")
+
+
+def _owners(kind: type) -> tuple[str, ...]:
+    return kind.__name__, "Spoofer-v0" if kind.__name__.startswith("Spoofer") else "Defender-v0"
+
+
+def _play_environment(env: Any) -> None:
+    observation, _ = env.reset(seed=1)
+    for _ in range(STEPS):
+        assert env.observation_space.contains(observation), "an observation outside its space"
+        action = env.action_space.sample()
+        observation, reward, terminated, truncated, _ = env.step(action)
+        assert np.all(np.isfinite(reward)), "a reward that is not finite"
+        if np.ndim(terminated) == 0 and (terminated or truncated):
+            break
+    env.close()
+
+
+def _environments(rng: np.random.Generator) -> Try:
+    kind, config, given = ENVIRONMENTS[int(rng.integers(len(ENVIRONMENTS)))]
+    vector = "num_envs" in given
+    keys = [item.name for item in fields(config)] + ["render_mode", *(OF_VECTORS if vector else ())]
+    key = str(rng.choice(keys))
+    value = hostile(rng)
+    if isinstance(value, str) and key in ("scenario", "shadow", "detector", "detectors", "attacks", "response"):
+        value = hostile_text(rng)
+    if key == "num_envs" and isinstance(value, int | float) and 20 < value < 100_000:
+        value = 20  # more lanes are only slower
+    arguments = {**given, key: value}
+    owners = (*_owners(kind), "scenario", "action") if key in ("fidelity", "shadow") else _owners(kind)
+    words = f"{kind.__name__}({', '.join(f'{name}={_shown(item)}' for name, item in arguments.items())})"
+    return Try(words, owners, (key,), lambda: kind(**arguments), _play_environment)
+
+
+@cache
+def _environment(place: int) -> Any:
+    kind, _, given = ENVIRONMENTS[place]
+    return kind(**given, **({"autoreset_mode": AutoresetMode.SAME_STEP} if "num_envs" in given else {}))
+
+
+def _resets(rng: np.random.Generator) -> Try:
+    place = int(rng.integers(len(ENVIRONMENTS)))
+    key, value = ("seed", "options")[int(rng.random() < 0.5)], hostile(rng)
+    if key == "options" and rng.random() < 0.5:
+        value = {"reset_mask": value} if rng.random() < 0.5 else {str(value)[:20]: 1}
+    kind = ENVIRONMENTS[place][0]
+    words = f"{kind.__name__}.reset({key}={_shown(value)})"
+    env = _environment(place)
+    return Try(words, (*_owners(kind), "options['reset_mask']"), (key,), lambda: env.reset(**{key: value}), _nothing)
+
+
+def _actions(rng: np.random.Generator) -> Try:
+    place = int(rng.integers(len(ENVIRONMENTS)))
+    env = _environment(place)
+    env.reset(seed=2)
+    good = np.asarray(env.action_space.sample())
+    value = ACTIONS[int(rng.integers(len(ACTIONS)))]
+    if rng.random() < 0.6:  # within an action of the right shape
+        action: Any = good.tolist()
+        row = action[0] if good.ndim == 2 else action
+        row[int(rng.integers(len(row)))] = value
+        if rng.random() < 0.5:
+            try:
+                action = np.array(action)
+            except (ValueError, TypeError):
+                action = np.array(action, dtype=object)
+    elif rng.random() < 0.5:
+        shape = (int(rng.integers(4)),) * int(rng.integers(4))
+        action = np.zeros(shape, dtype=str(rng.choice(["f8", "i8", "c16", "?", "U3"])))
+    else:
+        action = value
+    words = f"{ENVIRONMENTS[place][0].__name__}.step({_shown(action)})"
+
+    def play(_: Any) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            observation, reward, *_rest = env.step(action)
+        assert np.all(np.isfinite(observation)), "an observation that is not finite"
+        assert np.all(np.isfinite(reward)), "a reward that is not finite"
+
+    return Try(words, ("action", "actions"), ("action", "actions"), lambda: None, play)
+
+
+# --- other callables --------------------------------------------------------------------------------------------------
+
+
+def _simulate(**arguments: Any) -> Simulation:
+    return Simulation(make_scenario(LOOSE), None, [make_detector("snapshot")], **arguments)
+
+
+def _streams(**arguments: Any) -> RunStreams:
+    return RunStreams.from_seed(**{"seed": 1, "num_runs": 2, **arguments})
+
+
+OTHER_CALLABLES: tuple[tuple[Callable[..., Any], tuple[str, ...], tuple[str, ...], Callable[[Any], None]], ...] = (
+    (_simulate, ("Simulation", "scenario"), ("num_runs", "seed", "threads", "fidelity", "response", "attack"), _run),
+    (RunSlices, ("slices of runs",), ("threads",), _nothing),
+    (_streams, ("random streams",), ("seed", "num_runs"), _nothing),
+)
+
+
+def _others(rng: np.random.Generator) -> Try:
+    function, owners, keys, play = OTHER_CALLABLES[int(rng.integers(len(OTHER_CALLABLES)))]
+    key, value = str(rng.choice(keys)), hostile(rng)
+    words = f"{owners[0]}({key}={_shown(value)})"
+    return Try(words, (*owners, "slices of runs"), (key,), lambda: function(**{key: value}), play)
+
+
+GENERATORS: tuple[Callable[[np.random.Generator], Try], ...] = (
+    _parts, _parts, _parts, _environments, _environments, _resets, _actions, _others,
+)  # fmt: skip
+
+
+def attempts(seed: int, tries: int) -> Iterator[Try]:
+    """The tries of ``fuzz``, one by one."""
+    rng = np.random.default_rng(seed)
+    for _ in range(tries):
+        yield GENERATORS[int(rng.integers(len(GENERATORS)))](rng)
