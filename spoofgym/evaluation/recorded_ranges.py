@@ -21,12 +21,12 @@ from spoofgym.arrays import Flags, Floats
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.monte_carlo import horizontal
-from spoofgym.evaluation.recorded import SETTLING
 from spoofgym.geodesy import position_difference
+from spoofgym.scenarios.fix_rows import UNMEASURED_SIGMA
 from spoofgym.scenarios.log import Fixes, interpolate, read_log
 from spoofgym.scenarios.range_epochs import RangeEpochs
-from spoofgym.scenarios.recorded import UNMEASURED_SIGMA, recorded
-from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.recorded import recorded
+from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
 

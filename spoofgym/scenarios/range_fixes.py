@@ -105,8 +105,8 @@ def check_solved(log: Log, ranges: Ranges, solution: RangeSolution) -> None:
         sign = "; with all signs changed they fit" if turned.solved.sum() > LEAST_SHARE * placed else ""
         raise ValueError(
             f"{owner} must give a fix in 2 epochs or more: range_rate_mps gives a velocity in {solved} of {placed} "
-            f"epochs that have a position; the rates must be in m/s and positive where the satellite recedes, - Doppler "
-            f"x c / f{sign}"
+            "epochs that have a position; the rates must be in m/s and positive where the satellite recedes, "
+            f"- Doppler x c / f{sign}"
         )
 
 

@@ -89,7 +89,9 @@ class RecordedRanges(RecordedScenario):
         start = int(self.epochs.fix[self.alignment.fix]) + 1
         stop = int(np.searchsorted(self.epochs.time, self._end, side="right"))
         if stop - start < 4:
-            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s")
+            raise ValueError(
+                f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s"
+            )
         return self.epochs.part(start, stop)
 
     @property
