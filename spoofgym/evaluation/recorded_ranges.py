@@ -29,6 +29,7 @@ from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
+from spoofgym.validation import written
 
 FILTERS: dict[str, Callable[[str], RecordedScenario]] = {
     "loose, receiver's fixes": partial(recorded, fixes="phone"),
@@ -154,8 +155,8 @@ def game_onsets(fixes: Fixes, begin: float, end: float) -> Floats:
     ]
     if not onsets:
         raise ValueError(
-            f"the drive leaves no game of {DURATION:g} s without a gap of {LONGEST_GAP:g} s between {begin:g} and "
-            f"{end:g} s"
+            f"the drive leaves no game of {DURATION:g} s without a gap of {LONGEST_GAP:g} s between "
+            f"{written(begin)} and {written(end)} s"
         )
     return np.array(onsets)
 
