@@ -66,11 +66,14 @@ class Timeline:
         """Time from epochs to others, s; where it is a multiple of the interval but for rounding, that multiple.
 
         Args:
-            first: epochs, of any shape.
+            first: epochs, of any shape; those before epoch 0 count as the interval apart.
             last: epochs, of a shape that fits.
         """
-        usual, real = (last - first) * self.interval, self.times[last] - self.times[first]
+        usual, real = (last - first) * self.interval, self._time_of(last) - self._time_of(first)
         return np.where(np.abs(real - usual) <= ROUNDING, usual, real)
+
+    def _time_of(self, epoch: Runs) -> Floats:
+        return np.asarray(self.times[np.maximum(epoch, 0)] + np.minimum(epoch, 0) * self.interval)
 
     @cached_property
     def intervals(self) -> Floats:
