@@ -30,7 +30,7 @@ from spoofgym.scenarios import make_scenario
 SOURCES = (
     *("sensors/*.py", "navigation/*.py", "detectors/*.py", "scenarios/*.py", "attacks/*.py"),
     *("simulation.py", "scenario.py", "tight_scenario.py", "trajectory.py", "geodesy.py", "streams.py", "arrays.py"),
-    *("specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
+    *("timeline.py", "specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
 )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
-from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline
+from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
 from spoofgym.navigation.strapdown_model import strapdown_model
 from spoofgym.navigation.tight import TightNavigator
@@ -35,6 +35,7 @@ from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.ranging import RangeErrors
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 from spoofgym.trajectory import Trajectory
 
 

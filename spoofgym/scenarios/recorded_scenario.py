@@ -10,7 +10,6 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.geodesy import position_difference
-from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
@@ -19,6 +18,7 @@ from spoofgym.scenarios.alignment import Alignment, align
 from spoofgym.scenarios.clean_run import CleanRun, coast
 from spoofgym.scenarios.log import Log, interpolate
 from spoofgym.sensors.imu import ImuGrade
+from spoofgym.timeline import Timeline
 
 MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""

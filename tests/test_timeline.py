@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spoofgym.navigation.interface import Timeline, manoeuvre_times
+from spoofgym.timeline import Timeline, manoeuvre_times
 
 GAP = Timeline(np.array([10.0, 11.0, 12.0, 40.0, 41.0, 42.4]), 1.0)
 
