@@ -6,8 +6,9 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 
 class OffsetSequence(Attack):

@@ -32,7 +32,7 @@ from spoofgym.scenarios import make_scenario
 SOURCES = (
     *("sensors/*.py", "navigation/*.py", "detectors/*.py", "scenarios/*.py", "attacks/*.py"),
     *("simulation.py", "scenario.py", "tight_scenario.py", "trajectory.py", "geodesy.py", "streams.py", "arrays.py"),
-    *("specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
+    *("timeline.py", "specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
     *("quadratic_form.py", "clean_starts.py", "burn_in_cache.py", "parallel.py"),
 )
 LARGEST_FILE = 2**16

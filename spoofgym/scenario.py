@@ -16,7 +16,7 @@ from spoofgym.immutable import Immutable
 from spoofgym.navigation.adaptation import Adaptation
 from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
-from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline, manoeuvre_times
+from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear import LinearNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
 from spoofgym.navigation.loose import StrapdownNavigator
@@ -31,6 +31,7 @@ from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.range_fix import RangeFix, draw_fix_noise
 from spoofgym.sensors.receiver import Receiver, draw_noise
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline, manoeuvre_times
 from spoofgym.trajectory import Trajectory
 from spoofgym.validation import shown, written
 

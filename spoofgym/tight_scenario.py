@@ -11,7 +11,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
-from spoofgym.navigation.interface import Demands, Navigator, Spoof, Timeline
+from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
 from spoofgym.navigation.strapdown_model import strapdown_model
 from spoofgym.navigation.tight import TightNavigator
@@ -36,6 +36,7 @@ from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.ranging import RangeErrors
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 from spoofgym.trajectory import Trajectory
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 
 class AroundAttack(Attack):

@@ -10,8 +10,9 @@ from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.fixed_offsets import FixedOffsets
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.specification import spell
+from spoofgym.timeline import Timeline
 from spoofgym.validation import written
 
 DECAY = 45.0

@@ -7,9 +7,10 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 from spoofgym.validation import written
 
 

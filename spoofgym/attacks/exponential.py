@@ -8,8 +8,9 @@ from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import EAST, heading
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.specification import spell
+from spoofgym.timeline import Timeline
 from spoofgym.validation import written
 
 GROWTH_TIME = 30.0

@@ -13,9 +13,10 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.navigation.interface import Clock, Timeline, manoeuvre_times
+from spoofgym.navigation.interface import Clock
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline, manoeuvre_times
 
 DRAWS = 12
 """Uniform numbers of an episode, whatever becomes of them: six for the time and the heading, six for the shape."""

@@ -7,8 +7,8 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.fixed_offsets import FixedOffsets
-from spoofgym.navigation.interface import Timeline
 from spoofgym.specification import spell
+from spoofgym.timeline import Timeline
 
 
 def path(velocity: Floats, timeline: Timeline, time: Floats) -> Floats:

@@ -20,10 +20,11 @@ from spoofgym.attacks.families import (
     TwoStageRamp,
     spoofed_stretch,
 )
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 CLEAN = -1
 """Member of a run without an attack."""

@@ -11,9 +11,10 @@ from scipy import special
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 from spoofgym.validation import written
 
 EAST = 90.0

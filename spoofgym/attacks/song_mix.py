@@ -5,8 +5,9 @@ from __future__ import annotations
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import Jump, SlowChange
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 JUMP, SLOW_CHANGE = (50.0, 100.0), (150.0, 200.0)
 """Onset and end of each part, scenario time, s (Song 2021, section 4.2)."""

@@ -8,10 +8,11 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.around import AroundAttack
 from spoofgym.attacks.base import Attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.specification import nest, spell
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 SIGMA = 0.3
 MOST_SIGMA = 1e6

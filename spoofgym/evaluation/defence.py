@@ -16,13 +16,14 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
 from spoofgym.evaluation.monte_carlo import batches, horizontal
-from spoofgym.navigation.interface import Decision, Demands, Timeline
+from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching
 from spoofgym.scenario import Scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 BATCH = 1000
 

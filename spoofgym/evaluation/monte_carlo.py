@@ -13,10 +13,10 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.navigation.interface import Timeline
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 BATCH = 2000
 NEVER = -1

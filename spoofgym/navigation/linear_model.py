@@ -17,10 +17,10 @@ from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
-from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.receiver import Receiver
+from spoofgym.timeline import Timeline
 from spoofgym.trajectory import Trajectory
 
 

@@ -16,6 +16,7 @@ from spoofgym.navigation.linear_model import antenna_arm
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.receiver import Receiver
+from spoofgym.timeline import Timeline
 from spoofgym.trajectory import Trajectory
 
 PART = 1.0

@@ -13,7 +13,6 @@ from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
@@ -24,6 +23,7 @@ from spoofgym.scenarios.log import Log, covered, interpolate
 from spoofgym.scenarios.log_warning import warn
 from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import ImuGrade
+from spoofgym.timeline import Timeline
 
 MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""

@@ -20,7 +20,7 @@ from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.navigation.credible import ANCHORING, AuxiliaryRule, CredibleModel, CredibleNavigator
 from spoofgym.navigation.credible_filter import CredibleTuning, credible_linear_model, standing_start
 from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
-from spoofgym.navigation.interface import Demands, Timeline
+from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT
 from spoofgym.parallel import RunSlices
@@ -31,6 +31,7 @@ from spoofgym.sensors.odometer import GRADES, Odometer, OdometerGrade, PlanarMot
 from spoofgym.sensors.receiver import Receiver, draw_noise
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 COURT = (13.4, 6.1)
 """Sides of the rectangle, m."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.interface import Timeline
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 DRAWS = 8
 """Uniform numbers of an episode, whatever becomes of them."""

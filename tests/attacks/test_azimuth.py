@@ -9,9 +9,10 @@ import pytest
 
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.azimuth import FOI_SCENARIOS, azimuth_error
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 REPORT = {1: 26.0, 2: 55.0, 3: 178.0, 4: 369.0, 5: 12.0, 6: 8.0, 7: 5.0, 8: 6.0}
 """Largest position error of the receiver, m: FOI-R-5687, chapter 5.1 and table 7, read to the metre."""

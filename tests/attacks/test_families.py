@@ -5,8 +5,9 @@ import pytest
 from scipy import stats
 
 from spoofgym.attacks import AttackPool, RandomJump, make_attack
-from spoofgym.navigation.interface import Clock, Timeline, manoeuvre_times
+from spoofgym.navigation.interface import Clock
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline, manoeuvre_times
 
 TIMELINE = Timeline.steady(20.0, 1.0, 230)
 TRAINING = ["random-ramp", "random-jump", "random-growth"]

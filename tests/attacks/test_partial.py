@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks import AttackPool, Partial, make_attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(start=20.0, interval=0.5, num_epochs=40)
 FLIGHT = make_scenario("kujur-flight:onset=60,horizon=20")

@@ -6,10 +6,11 @@ from scipy import stats
 
 from spoofgym.attacks import ATTACKS, AttackPool, make_attack, opponents
 from spoofgym.detectors import make_detector
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(20.0, 1.0, 60)
 FALSE_FAILURE = 1e-8

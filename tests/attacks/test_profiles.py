@@ -5,8 +5,9 @@ import pytest
 from scipy import stats
 
 from spoofgym.attacks import ATTACKS, Jump, JumpRamp, Ramp, make_attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(start=800.0, interval=1.0, num_epochs=120)
 RANDOM = ["jump", "slow-change"]

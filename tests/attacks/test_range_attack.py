@@ -6,9 +6,10 @@ import pytest
 from spoofgym.attacks import LiuSpoofer, make_attack
 from spoofgym.attacks.range_attack import SPEED_OF_LIGHT, control_delay
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(start=20.0, interval=0.5, num_epochs=120)
 CARRIER = make_scenario("kujur-flight:onset=60,horizon=40")

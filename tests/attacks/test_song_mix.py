@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks import make_attack
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(0.0, 1.0, 300)
 

@@ -7,10 +7,11 @@ from scipy import stats
 from spoofgym.attacks import AttackPool, make_attack
 from spoofgym.attacks.tracking_error import TrackingError
 from spoofgym.envs.spoofer import SpooferEnv
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(start=20.0, interval=1.0, num_epochs=120)
 NORTH = np.broadcast_to([0.0, 10.0, 0.0], (121, 3))

@@ -19,7 +19,7 @@ from spoofgym.evaluation.defence_metrics import (
     paired_difference,
     time_to_reuse,
 )
-from spoofgym.navigation.interface import Timeline
+from spoofgym.timeline import Timeline
 
 EPOCHS = 60
 

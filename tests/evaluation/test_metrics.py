@@ -12,9 +12,9 @@ from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import attacker_score, mean_interval, undetected_error
 from spoofgym.evaluation.monte_carlo import NEVER, Episodes, play_attack
-from spoofgym.navigation.interface import Timeline
 from spoofgym.optimum import best_ramp, expected_play
 from spoofgym.scenarios import make_scenario
+from spoofgym.timeline import Timeline
 
 
 def episodes(alarm_epoch, interval=1.0):

@@ -13,7 +13,8 @@ from spoofgym.evaluation.patient_spoofer import (
     main,
     play,
 )
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
+from spoofgym.timeline import Timeline
 
 
 def test_it_jumps_waits_and_drags_off():

@@ -170,6 +170,11 @@ def test_what_a_defender_sees_of_time(silent: Path) -> None:
     np.testing.assert_allclose([row[coasting] for row in seen], [0.0, 0.0, 0.0, 0.0, END - BEGIN - 1.0, 0.0])
     changes = np.linalg.norm(np.diff(speeds, axis=0), axis=1) / [1.0, 1.0, 1.0, END - BEGIN, 1.0]
     np.testing.assert_allclose([row[acceleration] for row in seen[1:]], changes)
+    game.reset(np.arange(1))
+    for _ in range(5):
+        game.step(np.array([[1, 0]]))
+    # none used since before epoch 0, and two more after the outage
+    assert game.features._raw[0, coasting] == END - BEGIN + 4.0
 
 
 # --- the filter -------------------------------------------------------------------------------------------------------

@@ -5,11 +5,12 @@ import pytest
 from scipy import stats
 
 from spoofgym.detectors import make_detector
-from spoofgym.navigation.interface import Decision, Demands, Timeline
+from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(20.0, 1.0, 230)
 FALSE_FAILURE = 1e-8

@@ -18,10 +18,11 @@ from spoofgym.attacks import make_attack
 from spoofgym.attacks.azimuth import DECAY, azimuth_error
 from spoofgym.attacks.base import Attack
 from spoofgym.evaluation.reproduce.foi_tables import Attacked
-from spoofgym.navigation.interface import Clock, Timeline
+from spoofgym.navigation.interface import Clock
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.foi_drive import foi_trajectory
 from spoofgym.streams import RunStreams
+from spoofgym.timeline import Timeline
 
 RADIANS, DEGREES = 1.0, 180.0 / math.pi
 AGAINST_THE_TURNS = -1.0

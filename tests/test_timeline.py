@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spoofgym.navigation.interface import Timeline, manoeuvre_times
+from spoofgym.timeline import Timeline, manoeuvre_times
 
 GAP = Timeline(np.array([10.0, 11.0, 12.0, 40.0, 41.0, 42.4]), 1.0)
 
@@ -25,7 +25,7 @@ def test_a_receiver_that_misses_nothing_has_multiples_of_its_interval(start, int
 def test_missing_epochs_leave_the_others_at_their_times():
     assert (GAP.start, GAP.end, GAP.num_epochs) == (10.0, 42.4, 5)
     np.testing.assert_allclose(GAP.intervals, [1.0, 1.0, 28.0, 1.0, 1.4])
-    np.testing.assert_allclose(GAP.between(np.array([1, 3]), np.array([4, 5])), [30.0, 2.4])
+    np.testing.assert_allclose(GAP.between(np.array([1, 3, -2]), np.array([4, 5, 3])), [30.0, 2.4, 32.0])
 
 
 def test_a_gap_is_gone_through_in_steps():
