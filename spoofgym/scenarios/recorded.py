@@ -180,7 +180,7 @@ def recorded(
         raise ValueError(f"recorded: a path must not contain a comma, which separates options; got {path!r}")
     imu = imu_grade(grade)
     if onset is not None:
-        onset = validation.finite("recorded", "onset", onset)
+        onset = validation.time("recorded", "onset", onset)
     sigma_floor = validation.above("recorded", "sigma_floor", sigma_floor)
     noise_factor = validation.above("recorded", "noise_factor", noise_factor)
     fixes = validation.one_of("recorded", "fixes", fixes, FIXES)

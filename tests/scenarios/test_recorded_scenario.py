@@ -87,15 +87,26 @@ def test_a_good_drive_with_ranges_gives_none(tmp_path: Path) -> None:
         assert 0.3 < recorded(str(tmp_path / "log"), coupling="tight").clean.nis_per_degree(0) < 1.3
 
 
-def test_a_filter_that_is_lost_names_the_line(tmp_path: Path) -> None:
-    folder = write_log(tmp_path / "log", reference=False)
-
+def test_fixes_that_stay_far_away_are_named(tmp_path: Path) -> None:
     def far(values: np.ndarray) -> np.ndarray:
         values[60:70, 1] += 20.0
         return values
 
-    with pytest.raises(ValueError, match=r"diverges on this log; .* first too large at 63 s, line 62 of gnss\.csv"):
-        _ = recorded(str(edit(folder, "gnss", far))).clean
+    folder = edit(write_log(tmp_path / "log", reference=False), "gnss", far)
+    with pytest.warns(LogWarning, match=r"the largest is .* at 63 s, line 62 of gnss\.csv"):
+        _ = recorded(str(folder)).clean
+
+
+def test_a_filter_that_is_lost_names_the_line(tmp_path: Path) -> None:
+    """It falls through the Earth while there are no fixes."""
+    folder = edit(
+        write_log(tmp_path / "log", reference=False),
+        "gnss",
+        lambda values: values[(values[:, 0] < 70.0) | (values[:, 0] > 112.0)],
+    )
+    edit(folder, "imu", lambda values: np.where((values[:, :1] > 77.0) & (np.arange(7) == 6), -9000.0, values))
+    with pytest.raises(ValueError, match=r"diverges on this log; .* first too large at 113 s, line 69 of gnss\.csv"):
+        _ = recorded(str(folder)).clean
 
 
 @pytest.fixture(scope="module")
