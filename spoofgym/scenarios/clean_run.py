@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation.divergence import FilterDivergedError, diverged_error
 from spoofgym.navigation.interface import Decision
 from spoofgym.navigation.loose import StrapdownNavigator

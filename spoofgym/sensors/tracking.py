@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from spoofgym.arrays import Floats
+from spoofgym.kernels import njit
 
 
 def draw_tracking_error(
