@@ -12,6 +12,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.optimum import LinearTest, bounded_optimum, cumulative_optimum, ewma, gate, window_mean, zero_alarm
 from spoofgym.scenario import Scenario
+from spoofgym.specification import write
 
 MEANS = (10, 30, 60)
 WEIGHTS = (0.02, 0.05, 0.1)
@@ -63,6 +64,6 @@ def signed_tests(scenario: Scenario, arl0: float) -> list[LinearTest]:
 
 
 def _threshold(detector: str, scenario: Scenario, arl0: float) -> float:
-    ready = calibrated(make_detector(f"{detector},arl0={arl0:g}"), scenario)
+    ready = calibrated(make_detector(f"{detector},arl0={write(float(arl0))}"), scenario)
     assert ready.threshold is not None
     return ready.threshold

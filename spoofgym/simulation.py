@@ -128,7 +128,7 @@ class Simulation:
 
     def _require_clean_starts(self) -> None:
         if self.scenario.random:
-            require_clean_starts(self.scenario.name, list(self.detectors.values()), self._passes)
+            require_clean_starts(self.scenario.name, list(self.detectors.values()), self._passing)
 
     def _bind_attack(self, attack: Attack) -> None:
         if attack.needs_velocity and (self.scenario.dimension != 6 or self.scenario.coupling == "tight"):
@@ -226,11 +226,11 @@ class Simulation:
             f"{len(pending)} runs alarm in each of {MAX_REDRAWS} clean burn-ins: {far_too_low(self.detectors.values())}"
         )
 
-    def _passes(self, detectors: Sequence[Detector], runs: int) -> bool:
-        """Whether any of so many clean runs, none of them one of these, gets through a burn-in without an alarm."""
+    def _passing(self, detectors: Sequence[Detector], runs: int) -> int:
+        """How many of so many clean runs, none of them one of these, get through a burn-in without an alarm."""
         scenario, parts = self.scenario, [copy.deepcopy(detector) for detector in detectors]
         trial = _Trial(scenario, None, parts, None, runs, 0, fidelity=scenario.fidelities[0])
-        return not trial._burn_in(trial._all, trial._all, trial.detectors).all()
+        return runs - int(np.count_nonzero(trial._burn_in(trial._all, trial._all, trial.detectors)))
 
     def _burn_in(self, runs: Runs, places: Runs, bank: dict[str, Detector]) -> NDArray[np.bool_]:
         """One try of some runs at the burn-in; whether each alarmed in it, (n,)."""

@@ -91,11 +91,12 @@ def spell(name: str, value: object = None, **options: object) -> str:
 
     Numbers are written as shortly as they can be read back exactly: 1e5 as ``100000``, 0.5 as ``0.5``.
     """
-    written = {key: _write(content) for key, content in options.items() if content is not None}
-    return str(Specification(name, None if value is None else _write(value), written))
+    written = {key: write(content) for key, content in options.items() if content is not None}
+    return str(Specification(name, None if value is None else write(value), written))
 
 
-def _write(content: object) -> str:
+def write(content: object) -> str:
+    """A value as it is spelled after ``key=``."""
     if isinstance(content, bool):
         return str(content).lower()
     if isinstance(content, float):

@@ -14,10 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from spoofgym import validation
 from spoofgym.geodesy import normal_gravity
 from spoofgym.kernels import njit
 from spoofgym.navigation.mechanization import advance_position, attitude_matrix, invert_mechanization
+from spoofgym.validation import written
 
+MOST_STEPS = 20_000_000
+"""IMU intervals of a trajectory: it stays in memory, 200 bytes each."""
 MAX_LATITUDE = math.radians(89.0)
 """ENU turns without bound at a pole: trajectories stay below this latitude, rad."""
 
@@ -45,7 +49,7 @@ class Trajectory:
     specific_force: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        _require_positive("rate", self.rate)
+        validation.above("trajectory", "rate", self.rate)
         n = len(self.angular_rate)
         expected = {
             "time": (n + 1,),
@@ -86,7 +90,7 @@ class Straight:
     duration: float
 
     def __post_init__(self) -> None:
-        _require_positive("duration", self.duration)
+        validation.above(type(self).__name__, "duration", self.duration)
 
 
 @dataclass(frozen=True)
@@ -102,8 +106,8 @@ class Accelerate:
     duration: float
 
     def __post_init__(self) -> None:
-        _require_finite("speed_change", self.speed_change)
-        _require_positive("duration", self.duration)
+        validation.finite(type(self).__name__, "speed_change", self.speed_change)
+        validation.above(type(self).__name__, "duration", self.duration)
 
 
 @dataclass(frozen=True)
@@ -119,8 +123,8 @@ class Climb:
     duration: float
 
     def __post_init__(self) -> None:
-        _require_finite("height_change", self.height_change)
-        _require_positive("duration", self.duration)
+        validation.finite(type(self).__name__, "height_change", self.height_change)
+        validation.above(type(self).__name__, "duration", self.duration)
 
 
 @dataclass(frozen=True)
@@ -136,8 +140,8 @@ class Turn:
     duration: float
 
     def __post_init__(self) -> None:
-        _require_finite("angle", self.angle)
-        _require_positive("duration", self.duration)
+        validation.finite(type(self).__name__, "angle", self.angle)
+        validation.above(type(self).__name__, "duration", self.duration)
 
 
 Manoeuvre = Straight | Accelerate | Climb | Turn
@@ -202,20 +206,25 @@ def fly(
     for item in manoeuvres:
         if not isinstance(item, Manoeuvre):
             raise ValueError(f"a manoeuvre is one of Straight, Accelerate, Climb, Turn, got {item!r}")
-    _require_positive("speed", speed)
-    _require_positive("rate", rate)
-    _require_finite("heading", heading)
+    speed = validation.above("fly", "speed", speed)
+    rate = validation.above("fly", "rate", rate)
+    heading = validation.finite("fly", "heading", heading)
     start = _start(position)
     num_steps = math.floor(sum(item.duration for item in manoeuvres) * rate * (1.0 + 1e-12))
     if num_steps < 1:
         raise ValueError(f"manoeuvres must last at least one IMU interval of {1.0 / rate} s together")
+    if num_steps > MOST_STEPS:
+        raise ValueError(
+            f"fly: manoeuvres must last {MOST_STEPS} IMU intervals at most together, which are "
+            f"{written(MOST_STEPS / rate)} s at a rate of {written(rate)} Hz, got {num_steps} intervals"
+        )
     time = np.arange(num_steps + 1) / rate
     path_speed, climb_rate, heading_along, turn_rate = _profiles(manoeuvres, time, speed, heading)
     if np.any(np.abs(climb_rate) >= path_speed):
         i = int(np.argmax(np.abs(climb_rate) - path_speed))
         raise ValueError(
-            f"climb rate {climb_rate[i]:.6g} m/s at {time[i]:.6g} s is not below the speed {path_speed[i]:.6g} m/s: "
-            "make the climb longer or lower"
+            f"climb rate {climb_rate[i]:.6g} m/s at {written(time[i])} s is not below the speed "
+            f"{path_speed[i]:.6g} m/s: make the climb longer or lower"
         )
     climb_angle = np.arcsin(climb_rate / path_speed)
     ground_speed = path_speed * np.cos(climb_angle)
@@ -254,7 +263,7 @@ def _profiles(
         fraction = (time - begin) / item.duration
         if isinstance(item, Accelerate):
             final_speed += item.speed_change
-            _require_positive(f"speed after {item}", final_speed)
+            validation.above("fly", f"speed after {item}", final_speed)
             path_speed += item.speed_change * smooth_step(fraction)
         elif isinstance(item, Climb):
             climb_rate += item.height_change / item.duration * smooth_step_rate(fraction)
@@ -281,23 +290,16 @@ def _integrate_position(
 
 
 def _start(position: ArrayLike) -> NDArray[np.float64]:
-    start = np.array(position, dtype=np.float64)
-    if start.shape != (3,) or not np.all(np.isfinite(start)):
+    given = validation.real_array(position)
+    if given is None or given.shape != (3,) or not np.all(np.isfinite(given)):
         raise ValueError(
-            f"position must be three finite numbers (latitude rad, longitude rad, height m), got {position!r}"
+            "position must be three finite numbers (latitude rad, longitude rad, height m), got "
+            f"{validation.shown(position)}"
         )
+    start = np.array(given, dtype=np.float64)
     if abs(start[0]) > MAX_LATITUDE:
         raise ValueError(
-            f"latitude must lie within +-{MAX_LATITUDE:.4f} rad, got {start[0]:.6g}: are these degrees or is it a pole?"
+            f"latitude must lie within +-{MAX_LATITUDE:.4f} rad, got {written(start[0])}: are these degrees or is it a "
+            "pole?"
         )
     return start
-
-
-def _require_positive(name: str, value: float) -> None:
-    if not (value > 0.0 and math.isfinite(value)):
-        raise ValueError(f"{name} must be a positive finite number, got {value!r}")
-
-
-def _require_finite(name: str, value: float) -> None:
-    if not math.isfinite(value):
-        raise ValueError(f"{name} must be a finite number, got {value!r}")

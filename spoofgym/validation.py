@@ -107,11 +107,11 @@ def between(owner: str, name: str, value: Any, least: float, largest: float) -> 
     Raises:
         ValueError: it is not.
     """
-    wanted = f"a number from {_bound(least)} to {_bound(largest)}"
+    wanted = f"a finite number{' greater than 0' if least > 0.0 else ''}"
     number = _real(owner, name, value, wanted)
-    if not least <= number <= largest:
+    if least > 0.0 >= number:
         raise ValueError(_message(owner, name, wanted, value))
-    return number
+    return _within(owner, name, wanted, number, least, largest)
 
 
 def hour(owner: str, name: str, value: Any) -> float:
@@ -255,6 +255,22 @@ def triple(owner: str, name: str, values: Any, axes: str = "E, N, U") -> tuple[f
         raise ValueError(_message(owner, name, wanted, values))
     first, second, third = (finite(owner, name, value) for value in array.tolist())
     return first, second, third
+
+
+def span(owner: str, name: str, values: Any) -> tuple[float, float]:
+    """The values as two finite numbers greater than zero, the least first.
+
+    Raises:
+        ValueError: they are not.
+    """
+    wanted = "two positive numbers, least first"
+    array = real_array(values)
+    if array is None or array.shape != (2,):
+        raise ValueError(_message(owner, name, wanted, values))
+    low, high = (above(owner, name, value) for value in array.tolist())
+    if high < low:
+        raise ValueError(_message(owner, name, wanted, values))
+    return low, high
 
 
 def boolean(owner: str, name: str, value: Any) -> bool:

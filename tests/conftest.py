@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import stat
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +17,16 @@ def pytest_configure(config: pytest.Config) -> None:
         # thresholds that tests calibrate, never among the user's
         os.environ["SPOOFGYM_CACHE"] = str(folder)
         os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(folder / "hypothesis")
+
+
+@pytest.fixture
+def package_copy(tmp_path: Path) -> Path:
+    """A copy of the package that a test may change, even where the checkout cannot be written."""
+    source = Path(__file__).parents[1] / "spoofgym"
+    copy = shutil.copytree(source, tmp_path / "spoofgym", ignore=shutil.ignore_patterns("__pycache__"))
+    for path in (copy, *copy.rglob("*")):
+        path.chmod(path.stat().st_mode | stat.S_IWUSR)
+    return copy
 
 
 def _in_the_test_cache(config: pytest.Config) -> Path | None:

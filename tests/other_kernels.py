@@ -3,7 +3,7 @@
 OpenBLAS, NumPy and numba choose their code by the processor, and each code rounds in its own way. Here all three take
 that for the oldest ones: short vectors, no fused multiply-add. A tolerance that only this machine's code meets, or two
 results that are equal by its luck, then fail. A variable that is set stays as it is, to try another processor:
-``OPENBLAS_CORETYPE=Haswell``.
+``OPENBLAS_CORETYPE=Haswell``. Tests marked slow are left out, to keep the check of a change short; ``-m ""`` adds them.
 """
 
 import os
@@ -33,7 +33,7 @@ def other_kernels() -> dict[str, str]:
 def main() -> int:
     """Run pytest; its exit status."""
     left_out = [f"--ignore=tests/{name}" for name in NOT_NUMERICAL]
-    command = [sys.executable, "-m", "pytest", *left_out, *(sys.argv[1:] or ["tests"])]
+    command = [sys.executable, "-m", "pytest", *left_out, "-m", "not slow", *sys.argv[1:]]
     return subprocess.run(command, cwd=ROOT, env={**other_kernels(), **os.environ}, check=False).returncode
 
 

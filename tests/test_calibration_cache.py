@@ -186,10 +186,8 @@ def test_other_code_or_settings_make_another_result(place, monkeypatch):
     assert len({calibration_cache.key(*parts) for parts in different}) == len(different)
 
 
-def test_the_digest_covers_what_decides_a_result(monkeypatch, tmp_path):
-    copy = shutil.copytree(
-        Path(spoofgym.__file__).parent, tmp_path / "spoofgym", ignore=shutil.ignore_patterns("__pycache__")
-    )
+def test_the_digest_covers_what_decides_a_result(monkeypatch, package_copy):
+    copy = package_copy
     monkeypatch.setattr(spoofgym, "__file__", str(copy / "__init__.py"))
     before = calibration_cache._source()
     assert before == calibration_cache._source()

@@ -19,9 +19,10 @@ def test_the_folders_can_be_written():
 """
 
 
-@pytest.mark.parametrize("workers", ["0", "1"])
-@pytest.mark.parametrize("cache", ["kept", "cannot be written", "switched off"])
-def test_the_suite_runs_with_and_without_a_test_cache(tmp_path, workers, cache):
+@pytest.mark.parametrize(
+    ("cache", "workers"), [("kept", "0"), ("cannot be written", "1"), ("switched off", "0"), ("switched off", "1")]
+)
+def test_the_suite_runs_with_and_without_a_test_cache(tmp_path, cache, workers):
     checkout = tmp_path / "checkout"
     (checkout / "tests").mkdir(parents=True)
     shutil.copy(ROOT / "pyproject.toml", checkout)

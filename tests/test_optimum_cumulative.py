@@ -57,7 +57,7 @@ def test_what_cannot_be_is_refused(model):
         missed_magnitude(50.0, 30, 1.0)
     with pytest.raises(ValueError, match="degrees must be a whole number, 1 or more, got 0"):
         missed_magnitude(50.0, 0)
-    with pytest.raises(ValueError, match="threshold must be positive"):
+    with pytest.raises(ValueError, match="threshold must be a finite number greater than 0"):
         missed_magnitude(-1.0, 30)
     with pytest.raises(ValueError, match=r"num_epochs must lie in 1..30"):
         cumulative_optimum(model, 31, 200.0)

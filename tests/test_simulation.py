@@ -1,5 +1,6 @@
 """The loop over epochs: run i is the same whatever runs beside it, and what bad input is told."""
 
+import copy
 import dataclasses
 
 import numpy as np
@@ -213,9 +214,9 @@ def test_observing_beyond_the_end_raises():
         ({"detectors": [Windowed(7)]}, "detector 'windowed:n=7' has no threshold yet: calibrate it first"),
         ({"attack": Ramp(1.0, onset=10.0)}, "onset 10 s lies outside the game, which runs from 30 s to 35 s"),
         ({"attack": Ramp(1.0, onset=35.0)}, "onset 35 s lies outside the game"),
-        ({"runs": 0}, "num_runs must be 1 or more, got 0"),
+        ({"runs": 0}, "num_runs must be a whole number, 1 or more, got 0"),
         ({"seed": -1}, "seed must be a non-negative integer or None, got -1"),
-        ({"threads": 0}, "threads must be 1 or more, got 0"),
+        ({"threads": 0}, "threads must be a whole number, 1 or more, got 0"),
         ({"fidelity": "exact"}, "has no fidelity 'exact'; valid fidelities: linear, strapdown"),
     ],
 )
@@ -224,9 +225,36 @@ def test_bad_input_is_told_what_is_valid(options, message):
         simulation(matched(), **{"runs": 2, **options})
 
 
-def test_thresholds_that_alarm_in_every_burn_in_are_told():
+@pytest.mark.parametrize("scenario", [matched, coloured])
+def test_thresholds_that_alarm_in_nearly_every_burn_in_are_told_with_their_detectors(scenario):
+    loud, quiet = Windowed(4, threshold=1e-9), Windowed(5, threshold=1e6)
+    message = r"200 of 200 clean runs alarm .*: threshold 1e-09 of 'windowed:n=4,threshold=1e-09' is far too low"
+    with pytest.raises(ValueError, match=message):
+        simulation(scenario(), 2, detectors=[quiet, loud])
+    # the sum over the three epochs before the game, chi-square with 9 degrees of freedom, is below 2 in 0.9 % of runs:
+    # so many of 200 would pass with a probability of 1e-14
+    with pytest.raises(ValueError, match="threshold 2 of"):
+        simulation(matched(), 1, detectors=[Windowed(4, threshold=2.0)])
+
+
+def test_the_trial_of_thresholds_leaves_the_runs_as_they_are(monkeypatch):
+    detectors = [Windowed(4, threshold=14.0), Windowed(6, threshold=1e6)]
+    tried = simulation(coloured(), 3, detectors=copy.deepcopy(detectors))
+    monkeypatch.setattr(Simulation, "_require_clean_starts", lambda self: None)
+    untried = simulation(coloured(), 3, detectors=copy.deepcopy(detectors))
+    for sim in (tried, untried):
+        sim.reset()
+        sim.resolve()
+        sim.observe()
+    np.testing.assert_array_equal(tried.error, untried.error)
+    for name, statistic in tried.epoch.statistics.items():
+        np.testing.assert_array_equal(statistic, untried.epoch.statistics[name])
+
+
+def test_an_alarm_in_every_burn_in_all_the_same_names_the_thresholds(monkeypatch):
+    monkeypatch.setattr(Simulation, "_require_clean_starts", lambda self: None)
     sim = simulation(coloured(), 2, detectors=[Windowed(4, threshold=1e-9)])
-    with pytest.raises(RuntimeError, match="2 runs alarm in every clean burn-in: the thresholds are far too low"):
+    with pytest.raises(RuntimeError, match=r"2 runs alarm in each of 100 clean burn-ins: threshold 1e-09 of 'windowed"):
         sim.reset()
 
 
@@ -237,7 +265,7 @@ def test_thresholds_that_alarm_in_every_burn_in_are_told():
         ({"onset": 1.0}, "onset 1 s with a horizon of 5 epochs does not fit"),
         ({"onset": 1096.0}, "valid from 2 to 1095 s"),
         ({"onset": 30.5}, "onset 30.5 s is no epoch of a receiver at 1 Hz"),
-        ({"drag_off_rate": (4.0, 0.0, 4.0)}, "drag_off_rate and error_scale must be positive"),
+        ({"drag_off_rate": (4.0, 0.0, 4.0)}, "drag_off_rate must be a finite number greater than 0, got 0"),
         ({"receiver": Receiver(velocity_sigma=(1.0, 1.0, 1.0))}, "expects fixes of dimension 3, the receiver gives 6"),
     ],
 )

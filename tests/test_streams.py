@@ -106,7 +106,7 @@ def test_without_a_seed_every_batch_is_new():
 def test_bad_input_is_refused():
     with pytest.raises(ValueError, match="non-negative integer or None, got -1"):
         RunStreams.from_seed(-1, 2)
-    with pytest.raises(ValueError, match="num_runs must be 1 or more, got 0"):
+    with pytest.raises(ValueError, match="num_runs must be a whole number, 1 or more, got 0"):
         RunStreams.from_seed(0, 0)
     with pytest.raises(ValueError, match="unknown purpose 'weather' of a random stream; valid purposes: initial, imu"):
         RunStreams.from_seed(0, 1)(0, "weather")

@@ -159,13 +159,13 @@ def start(manoeuvres=MANOEUVRES, *, position=START, speed=9.0, heading=0.0, rate
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Straight(-1.0), "duration must be a positive finite number, got -1.0"),
+        (lambda: Straight(-1.0), "duration must be a finite number greater than 0, got -1.0"),
         (lambda: Turn(np.nan, 1.0), "angle must be a finite number, got nan"),
-        (lambda: Climb(1.0, 0.0), "duration must be a positive finite number, got 0.0"),
+        (lambda: Climb(1.0, 0.0), "duration must be a finite number greater than 0, got 0.0"),
         (lambda: Accelerate(np.inf, 1.0), "speed_change must be a finite number, got inf"),
         (lambda: start([]), "manoeuvres is empty: give at least one of Straight"),
-        (lambda: start(speed=0.0), "speed must be a positive finite number, got 0.0"),
-        (lambda: start(rate=-1.0), "rate must be a positive finite number"),
+        (lambda: start(speed=0.0), "speed must be a finite number greater than 0, got 0.0"),
+        (lambda: start(rate=-1.0), "rate must be a finite number greater than 0"),
         (lambda: start(heading=np.nan), "heading must be a finite number, got nan"),
         (lambda: start(position=(34.0, 108.0, 0.0)), "are these degrees"),
         (lambda: start(position=(0.5, 1.0)), "position must be three finite numbers"),

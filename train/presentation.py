@@ -9,6 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.table import Table
 
+from spoofgym import files
+
 BASELINE, LEARNED, BOUND = "#9a9a9a", "#0072b2", "#d55e00"
 BASELINES = ("none", "random", "best-ramp", "closed-form", "optimum", "upper-bound")
 
@@ -16,6 +18,11 @@ BASELINES = ("none", "random", "best-ramp", "closed-form", "optimum", "upper-bou
 def number(value: float | None, form: str = ".1f") -> str:
     """A figure of a table; a dash where there is none."""
     return "–" if value is None else format(value, form)
+
+
+def plain(name: str) -> str:
+    """A name as a label of a figure, where dollar signs would be mathematics."""
+    return name.replace("$", r"\$")
 
 
 def attackers_table(report: dict[str, Any]) -> Table:
@@ -29,7 +36,7 @@ def attackers_table(report: dict[str, Any]) -> Table:
         "had an alarm; at alarm: mean error then; exact: without simulation",
         box=None, padding=(0, 2, 0, 0),
     )
-    table.add_column("attacker", max_width=14, overflow="fold")
+    table.add_column("attacker", overflow="fold")
     table.add_column("knows", no_wrap=True)
     for title in ("error\nm", "exact\nm", "detected\n", "median\ns", "at alarm\nm", "of\noptimum"):
         table.add_column(title, justify="right", no_wrap=True)
@@ -118,10 +125,11 @@ def attackers_figure(report: dict[str, Any], path: Path) -> None:
     if bound is not None:
         axes.axvline(bound, color=BOUND, linestyle="--", linewidth=1.2)
         axes.text(bound, len(played) - 0.4, "upper bound ", color=BOUND, ha="right", va="bottom", fontsize=9)
-    labels = [f"{row['attacker']}\n({row['knowledge']})" for row in reversed(played)]
+    labels = [f"{plain(row['attacker'])}\n({row['knowledge']})" for row in reversed(played)]
     axes.set_yticks(range(len(played)), labels, fontsize=9)
     axes.set_xlabel("mean undetected horizontal error, m (95 % interval)")
-    axes.set_title(f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}", pad=16)
+    title = f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}"
+    axes.set_title(plain(title), pad=16)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    figure.savefig(path)
+    files.write_figure(path, figure)

@@ -11,6 +11,8 @@ from spoofgym.specification import spell
 from spoofgym.validation import written
 
 SCALE = 1.2
+LARGEST_FACTOR = 1e300
+"""The growth is computed in the logarithm: any factor is valid."""
 WAIT = 10.0
 LIMIT = 1000.0
 SIDES = ("left", "right")
@@ -73,7 +75,7 @@ class FusionRipper(FixedOffsets):
         onset: float | None = None,
     ) -> None:
         self.d = validation.zero_or_above("fusion-ripper", "d", d)
-        self.f = validation.finite("fusion-ripper", "f", f)
+        self.f = validation.finite("fusion-ripper", "f", f, LARGEST_FACTOR)
         if self.f < 1.0:
             raise ValueError(f"fusion-ripper: f must be 1 or more, got {f!r}")
         self.wait = validation.non_negative("fusion-ripper", "wait", wait)

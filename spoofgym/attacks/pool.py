@@ -152,6 +152,7 @@ def training_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT
         clean: share of runs without an attack.
         manoeuvre: share of attacks that begin in view of a manoeuvre.
     """
+    clean = validation.share("training", "clean", clean)
     families = (RandomRamp(manoeuvre), RandomJump(manoeuvre), RandomGrowth(manoeuvre))
     return AttackPool([(family, 1.0) for family in families], clean, _spell("training", clean, manoeuvre))
 
@@ -163,6 +164,7 @@ def held_out_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT
         clean: share of runs without an attack.
         manoeuvre: share of attacks that begin in view of a manoeuvre.
     """
+    clean = validation.share("held-out", "clean", clean)
     families = (
         TwoStageRamp(manoeuvre),
         SignChangingRamp(manoeuvre),

@@ -33,7 +33,7 @@ from spoofgym.detectors.signed_mean import SignedMean
 from spoofgym.detectors.solution_separation import SolutionSeparation
 from spoofgym.detectors.whiteness import Whiteness
 from spoofgym.detectors.window_bank import WindowBank
-from spoofgym.specification import Specification, build, unnest
+from spoofgym.specification import Specification, build, unnest, write
 
 SETS_THRESHOLD = ("threshold", "p_fa", "preset", "arl0", "jump_threshold", "slow_threshold", "gate", "factor")
 """Options that decide the threshold of a detector."""
@@ -119,7 +119,7 @@ def at_arl0(text: str, arl0: float) -> str:
         raise ValueError(f"unknown detector {specification.name!r}; valid names: {', '.join(sorted(DETECTORS))}")
     if decided or "arl0" not in inspect.signature(factory).parameters:
         return text
-    return str(replace(specification, options={**specification.options, "arl0": f"{arl0:g}"}))
+    return str(replace(specification, options={**specification.options, "arl0": write(float(arl0))}))
 
 
 def make_detector(detector: str | Detector) -> Detector:

@@ -11,6 +11,7 @@ from spoofgym.detectors.ring import Ring
 from spoofgym.navigation.facts import ODOMETER, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.specification import spell
+from spoofgym.validation import written
 
 SONG_JUMP_EPOCHS = 2
 SONG_SLOW_EPOCHS = 5
@@ -158,14 +159,14 @@ class Acna(Detector):
         for name, threshold in (("Th_j", self.jump_threshold), ("Th_s", self.slow_threshold)):
             if not least <= threshold <= most:
                 raise ValueError(
-                    f"detector {self.name!r}: {name} = {threshold:g} m must lie between one and three sigma of the "
-                    f"receiver of {facts.scenario!r}, from {least:g} to {most:g} m (Song 2021, eqs 17-20); an arl0 has "
-                    "no such bounds"
+                    f"detector {self.name!r}: {name} = {written(threshold)} m must lie between one and three sigma of "
+                    f"the receiver of {facts.scenario!r}, from {least:g} to {most:g} m (Song 2021, eqs 17-20); an arl0 "
+                    "has no such bounds"
                 )
         if facts.auxiliary_sigma is not None and self.slow_threshold < facts.auxiliary_sigma:
             raise ValueError(
-                f"detector {self.name!r}: Th_s = {self.slow_threshold:g} m must be at least what dead reckoning in "
-                f"{facts.scenario!r} goes wrong in an epoch, {facts.auxiliary_sigma:.3g} m (Song 2021, eq 21)"
+                f"detector {self.name!r}: Th_s = {written(self.slow_threshold)} m must be at least what dead reckoning "
+                f"in {facts.scenario!r} goes wrong in an epoch, {facts.auxiliary_sigma:.3g} m (Song 2021, eq 21)"
             )
 
     def reset(self, runs: Runs) -> None:

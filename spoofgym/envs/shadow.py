@@ -85,14 +85,14 @@ class ShadowFilter:
         for array in (self.prior, self.mean, self.whitened, self.coming):
             array[runs] = 0.0
 
-    def advance(self, index: Runs, offset: Floats, previous: Floats, interval: float) -> None:
+    def advance(self, index: Runs, offset: Floats, previous: Floats, interval: Floats) -> None:
         """Go through the fix of the present epoch.
 
         Args:
             index: the present epoch of each run, (N,).
             offset: added to its fix, (N, 3), m ENU.
             previous: added to the fix before, (N, 3), m ENU.
-            interval: between epochs, s.
+            interval: time since that epoch, (N,), s.
         """
         model = self.model
         self._slices.call(
@@ -136,7 +136,7 @@ def _advance(
     index: Runs,
     offset: Floats,
     previous: Floats,
-    interval: float,
+    interval: Floats,
     transition_columns: Floats,
     observation: Floats,
     factor: Floats,
@@ -152,7 +152,7 @@ def _advance(
     for run in runs:
         k = index[run]
         if k > 0:
-            _residual(observation[k], prior[run], offset[run], previous[run], interval, residual)
+            _residual(observation[k], prior[run], offset[run], previous[run], interval[run], residual)
             kalman.whiten(factor[k], residual, whitened[run])
             for i in range(NUM_STATES):
                 mean[run, i] = prior[run, i]
@@ -161,7 +161,7 @@ def _advance(
             for i in range(NUM_STATES):
                 prior[run, i] = mean[run, i]
             kalman.predict_error(transition_columns[k + 1], nothing, prior[run], work)
-            _residual(observation[k + 1], prior[run], offset[run], offset[run], interval, residual)
+            _residual(observation[k + 1], prior[run], offset[run], offset[run], interval[run], residual)
             kalman.whiten(factor[k + 1], residual, coming[run])
 
 

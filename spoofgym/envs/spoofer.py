@@ -45,7 +45,7 @@ class SpooferEnv(SingleEnv):
 
     - `action="rate"`: the rate at which the offset changes until the coming fix, one unit being the scenario's
       largest drag-off rate per axis (4 m/s on the Liu flight). The offset of a fix is that of the fix before plus
-      rate times interval.
+      rate times the time to the coming epoch.
     - `action="innovation"`: the mean whitened innovation that the coming fix is to provoke in the position axes, one
       unit being 4 sigma. The spoofer's shadow filter turns it into the offset; there is no limit of the rate. Needs
       `knowledge` "shadow" or "full".

@@ -222,7 +222,8 @@ class SpooferGame:
             self._begin(restarting)
             error[restarting] = self.error[restarting]
         if self.shadow is not None:
-            self.shadow.advance(epoch.index, self.offset, previous, self._interval)
+            interval = self._intervals[np.maximum(epoch.index - 1, 0)]
+            self.shadow.advance(epoch.index, self.offset, previous, interval)
         outcome = self._score(error)
         present = self._frame()
         self._frames.push(present)

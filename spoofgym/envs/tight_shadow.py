@@ -60,14 +60,14 @@ class TightShadowFilter:
         for array in (self.prior, self.mean, self.whitened, self.coming):
             array[runs] = 0.0
 
-    def advance(self, index: Runs, offset: Floats, previous: Floats, interval: float) -> None:
+    def advance(self, index: Runs, offset: Floats, previous: Floats, interval: Floats) -> None:
         """Go through the ranges of the present epoch.
 
         Args:
             index: the present epoch of each run, (N,).
             offset: of the position, m ENU, then of the clock, m, (N, 4).
             previous: that of the epoch before, (N, 4).
-            interval: between epochs, s.
+            interval: time since that epoch, (N,), s.
         """
         model, dynamics = self.model, self.model.dynamics
         self._slices.call(
@@ -79,6 +79,7 @@ class TightShadowFilter:
                 interval,
                 dynamics.transition_columns,
                 dynamics.decay,
+                dynamics.intervals,
                 dynamics.started,
                 dynamics.present,
                 dynamics.columns,
@@ -102,9 +103,10 @@ def _advance(
     index: Runs,
     offset: Floats,
     previous: Floats,
-    interval: float,
+    interval: Floats,
     transition_columns: Floats,
     decay: Floats,
+    intervals: Floats,
     started: Flags,
     present: Flags,
     columns: Runs,
@@ -125,7 +127,7 @@ def _advance(
         k = index[run]
         if k > 0:
             for a in range(4):
-                rate[a] = (offset[run, a] - previous[run, a]) / interval
+                rate[a] = (offset[run, a] - previous[run, a]) / interval[run]
             _spoofed(columns, values[k], present[k], offset[run], rate, added)
             tight_filter.observe(columns, values[k], prior[run], added, residual)
             kalman.whiten(factor[k], residual, ranges[0])
@@ -136,7 +138,7 @@ def _advance(
         if k < last:
             for i in range(n):
                 prior[run, i] = mean[run, i]
-            tight_filter.predict_error(transition_columns[k + 1], decay, interval, nothing, prior[run], work)
+            tight_filter.predict_error(transition_columns[k + 1], decay, intervals[k + 1], nothing, prior[run], work)
             _forget_satellites(started[k + 1], prior[run])
             _spoofed(columns, values[k + 1], present[k + 1], offset[run], still, added)
             tight_filter.observe(columns, values[k + 1], prior[run], added, residual)

@@ -19,6 +19,7 @@ from spoofgym.navigation.mechanization import mechanize
 from spoofgym.scenarios.log import interpolate
 from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.simulation import Simulation
+from spoofgym.validation import written
 
 SAME_TIME = 1e-3
 """A reference epoch this close to a fix, s, is that fix and no independent check."""
@@ -88,8 +89,8 @@ def clean_figures(scenario: RecordedScenario, detectors: Sequence[Detector]) -> 
     first = max(int(np.searchsorted(time, begin)), memory)
     if first > len(time) - 2:
         raise ValueError(
-            f"scenario {scenario.name!r}: the log ends at {time[-1]:g} s; clean figures need fixes after {begin:g} s "
-            f"and {memory} epochs"
+            f"scenario {scenario.name!r}: the log ends at {written(time[-1])} s; clean figures need fixes after "
+            f"{written(begin)} s and {memory} epochs"
         )
     whole = replace(scenario, onset=float(time[first]), horizon=None)
     simulation = Simulation(whole, None, detectors, seed=0, fidelity="strapdown")

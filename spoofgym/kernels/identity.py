@@ -80,7 +80,7 @@ def _value(value: object, code: CodeType, callers: tuple[object, ...]) -> object
     if isinstance(value, Dispatcher):
         return _kernel(value, callers)
     if isinstance(value, ModuleType):
-        return (value.__name__, _attributes(value, code, callers) if _ours(value.__name__) else [])
+        return (value.__name__, _attributes(value, code, callers))
     if isinstance(value, type):
         return (value.__module__, value.__qualname__, getattr(value, "_fields", None))
     if isinstance(value, FunctionType) and _ours(str(value.__module__)):
@@ -97,8 +97,10 @@ def _ours(module: str) -> bool:
 
 def _attributes(module: ModuleType, code: CodeType, callers: tuple[object, ...]) -> object:
     """What a code may take from a module of this package: the attributes that have a name in it."""
+    if module in callers or not _ours(module.__name__):
+        return None
     names = sorted(name for name in code.co_names if hasattr(module, name))
-    return [(name, _value(getattr(module, name), code, callers)) for name in names]
+    return [(name, _value(getattr(module, name), code, (*callers, module))) for name in names]
 
 
 @functools.cache

@@ -75,18 +75,16 @@ class Adaptation:
 
     def __post_init__(self) -> None:
         owner = "adaptation"
-        validation.whole(owner, "window", self.window, 1)
-        validation.whole(owner, "lag", self.lag, 0)
+        validation.epochs(owner, "window", self.window)
+        validation.epochs(owner, "lag", self.lag, 0)
         validation.above(owner, "threshold", self.threshold)
-        parts = self.guard.split("+")
+        parts = validation.text(owner, "guard", self.guard).split("+")
         for part in parts:
             validation.one_of(owner, "guard", part, GUARDS)
         if "none" in parts and len(parts) > 1:
             raise ValueError(f"{owner}: guard 'none' cannot be joined to others, got {self.guard!r}")
         for name in ("ratio_limits", "scale_limits", "noise_limits"):
-            low, high = getattr(self, name)
-            if not 0.0 < low <= high < math.inf:
-                raise ValueError(f"{owner}: {name} must be two positive numbers, least first, got {(low, high)}")
+            validation.span(owner, name, getattr(self, name))
 
     def has(self, guard: str) -> bool:
         """Whether a guard is on, by itself or among all."""
@@ -130,7 +128,8 @@ class Adaptation:
 def negative_ratio(run: int, epoch: int, time: float, ratio: float) -> NegativeRatioError:
     """The error of an unguarded run, which says what to choose instead."""
     return NegativeRatioError(
-        f"run {run}, epoch {epoch} at {time:g} s: alpha = {ratio:.3g} is negative, so that Q sqrt(alpha) is not a "
+        f"run {run}, epoch {epoch} at {validation.written(time)} s: "
+        f"alpha = {ratio:.3g} is negative, so that Q sqrt(alpha) is not a "
         "number: the innovations of the window are smaller than the R just matched to its residuals. The published "
         f"recursion ends here; choose a guard: {', '.join(GUARDS[1:])}"
     )

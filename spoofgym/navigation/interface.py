@@ -12,6 +12,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.navigation.position_domain import project_onto_position, whitened_axes
 from spoofgym.streams import RunStreams
@@ -294,8 +295,7 @@ class Demands:
     auxiliary: bool = False
 
     def __post_init__(self) -> None:
-        if self.history < 0:
-            raise ValueError(f"history must be 0 epochs or more, got {self.history}")
+        validation.epochs("demands", "history", self.history, 0)
         if self.history and not self.excludes:
             raise ValueError("a history needs a covariance per run: excludes must be True")
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.sensors.imu import ImuGrade
 
@@ -39,13 +40,18 @@ class FilterTuning:
     bias_states: bool = True
 
     def __post_init__(self) -> None:
-        if len(self.measurement_sigma) not in (3, 6) or min(self.measurement_sigma) <= 0:
-            raise ValueError(f"measurement_sigma must be 3 or 6 positive numbers, got {self.measurement_sigma}")
+        owner = "filter tuning"
+        for name in ("attitude_sigma", "velocity_sigma", "position_sigma"):
+            for sigma in validation.triple(owner, name, getattr(self, name)):
+                validation.non_negative(owner, name, sigma)
+        sigmas = validation.floats(owner, "measurement_sigma", self.measurement_sigma)
+        if sigmas.shape not in ((3,), (6,)) or np.any(sigmas <= 0.0):
+            given = validation.shown(self.measurement_sigma)
+            raise ValueError(f"{owner}: measurement_sigma must be 3 or 6 positive numbers, got {given}")
         for name in ("initial_scale", "process_noise_scale"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        if not self.position_random_walk >= 0:
-            raise ValueError(f"position_random_walk must not be negative, got {self.position_random_walk}")
+            validation.above(owner, name, getattr(self, name))
+        validation.non_negative(owner, "position_random_walk", self.position_random_walk)
+        validation.boolean(owner, "bias_states", self.bias_states)
 
     def initial_sigma(self, grade: ImuGrade) -> Floats:
         """True 1-sigma initial error of the 15 states."""

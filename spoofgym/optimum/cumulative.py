@@ -44,7 +44,8 @@ def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> flo
     if excess(0.0) <= 0.0:
         raise ValueError(
             f"cumulative test: without any bias threshold {validation.written(threshold)} with {degrees} degrees of "
-            f"freedom is passed with probability {missed * math.exp(excess(0.0)):.3g}, not more than {validation.written(missed)}"
+            f"freedom is passed with probability {missed * math.exp(excess(0.0)):.3g}, not more than "
+            f"{validation.written(missed)}"
         )
     far = math.sqrt(threshold) + 1.0
     while excess(far) > 0.0:

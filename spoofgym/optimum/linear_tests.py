@@ -104,7 +104,7 @@ def ewma(weight: float, limit: float) -> list[LinearTest]:
         raise ValueError(f"ewma: weight must be at most 1, got {weight!r}")
     length = 1 if weight == 1.0 else math.ceil(math.log(FORGOTTEN) / math.log1p(-weight))
     weights: Floats = math.sqrt(weight * (2.0 - weight)) * np.power(1.0 - weight, np.arange(length), dtype=np.float64)
-    return per_axis(f"ewma:{weight:g}", weights, limit)
+    return per_axis(f"ewma:{validation.written(weight)}", weights, limit)
 
 
 def per_axis(name: str, weights: Floats, limit: float) -> list[LinearTest]:

@@ -57,14 +57,15 @@ def align(log: Log) -> Alignment:
     """
     fixes, velocity = log.fixes, velocity_of(log.fixes)
     fix = _first_moving(log, velocity)
+    time = float(fixes.time[fix])
     course = np.arctan2(velocity[fix, 0], velocity[fix, 1])
     window = (log.imu_time >= fixes.time[fix - 1]) & (log.imu_time <= fixes.time[fix + 1])
     if not window.any():
-        raise ValueError(f"log {str(log.folder)!r}: no IMU samples around the alignment at {seconds(fixes.time[fix])} s")
+        raise ValueError(f"log {str(log.folder)!r}: no IMU samples around the alignment at {seconds(time)} s")
     force = log.specific_force[window].mean(axis=0)
     acceleration = (velocity[fix + 1] - velocity[fix - 1]) / (fixes.time[fix + 1] - fixes.time[fix - 1])
     antenna = fixes.position[fix]
-    where = f"log {str(log.folder)!r}: at the alignment at {seconds(fixes.time[fix])} s"
+    where = f"log {str(log.folder)!r}: at the alignment at {seconds(time)} s{fixes.line(time)},"
     attitude = _level(force, acceleration, float(course), normal_gravity(antenna[0], antenna[2]), where)
     return Alignment(fix, attitude, velocity[fix].copy(), displace(antenna, -attitude @ log.lever_arm))
 
@@ -89,9 +90,9 @@ def _first_moving(log: Log, velocity: Floats) -> int:
         moving = np.flatnonzero(fits & (speed >= least))
     if len(moving) == 0:
         raise ValueError(
-            f"log {str(log.folder)!r}: the vehicle must move after start_s = {seconds(log.start)} s, so that its course "
-            f"gives the heading: at {MIN_SPEED:g} m/s or more, or at {1.0 / MAX_COURSE_SIGMA:.0f} times the sigma of its "
-            f"velocity, {np.min(least, where=fits, initial=MIN_SPEED):.2g} m/s here; it reaches "
+            f"log {str(log.folder)!r}: the vehicle must move at {MIN_SPEED:g} m/s or more after start_s = "
+            f"{seconds(log.start)} s, so that its course gives the heading; {1.0 / MAX_COURSE_SIGMA:.0f} times the "
+            f"sigma of its velocity is enough, {np.min(least, where=fits, initial=MIN_SPEED):.2g} m/s here; it reaches "
             f"{np.max(speed, where=fits, initial=0.0):.2g} m/s"
         )
     return int(moving[0])
@@ -104,7 +105,7 @@ def _velocity_sigma(fixes: Fixes, around: Floats) -> Floats:
         fixes: of the log.
         around: time from the fix before each to the one after, (n,), s.
     """
-    sigma = np.full(len(fixes.time), max(DEFAULT_SIGMA["sd_vn_mps"], DEFAULT_SIGMA["sd_ve_mps"]))
+    sigma = np.full(len(fixes.time), max(DEFAULT_SIGMA[3:5]))
     if fixes.velocity_sigma is not None:
         return np.asarray(fixes.velocity_sigma[:, :2].max(axis=1))
     if fixes.position_sigma is not None:
@@ -124,9 +125,9 @@ def _level(force: Floats, acceleration: Floats, heading: float, gravity: float, 
         return attitude
     if _upright(force, np.zeros(3), heading, gravity)[1]:
         raise ValueError(
-            f"{where} the fixes show an acceleration of {np.linalg.norm(acceleration):.3g} m/s², which the specific force "
-            "does not: fixes, or the ranges and range rates that they are made from, are wrong there, or on another "
-            "clock than the IMU; a later start_s begins after it"
+            f"{where} the fixes show an acceleration of {np.linalg.norm(acceleration):.3g} m/s², which the specific "
+            "force does not: fixes, or the ranges and range rates that they are made from, are wrong there, or on "
+            "another clock than the IMU; a later start_s begins after it"
         )
     up = attitude[2]
     raise ValueError(

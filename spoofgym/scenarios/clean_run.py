@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from spoofgym.arrays import Floats
-from spoofgym.navigation.divergence import diverged_error
+from spoofgym.navigation.divergence import FilterDivergedError, diverged_error
 from spoofgym.navigation.interface import Decision
 from spoofgym.navigation.loose import StrapdownNavigator
 from spoofgym.navigation.mechanization import mechanize
@@ -20,6 +20,21 @@ from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 
 NUM_BIASES = 6
+LOST_NIS = 100.0
+"""NIS of one epoch per degree of freedom from which a filter that diverged was lost."""
+
+
+class CleanRunDivergedError(FilterDivergedError):
+    """The filter diverges on a log.
+
+    Attributes:
+        lost: when the innovations were first too large, s.
+    """
+
+    def __init__(self, text: str, lost: float) -> None:
+        """An error with this text."""
+        super().__init__(text)
+        self.lost = lost
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +80,7 @@ def clean_run(model: StrapdownModel) -> CleanRun:
     """Run the filter over all epochs of a model, every fix used.
 
     Raises:
-        FilterDivergedError: the filter diverges.
+        CleanRunDivergedError: the filter diverges.
     """
     navigator = StrapdownNavigator(model, 1, RunSlices(1))
     return CleanRun(*_states(navigator, np.zeros(NUM_JOINT), np.zeros((len(model.time), model.dimension))))
@@ -79,7 +94,7 @@ def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> Ti
         deviation: of the ranges from those of its reference, (E, m), m and m/s.
 
     Raises:
-        FilterDivergedError: the filter diverges.
+        CleanRunDivergedError: the filter diverges.
     """
     state = navigator.state
     parts = _states(navigator, np.zeros(state.shape[1] + NUM_BIASES), deviation, lambda: state)
@@ -139,7 +154,7 @@ def _states(
     """Attitude, velocity, position, bias, P, (E + 1, ...), NIS and its degrees, (E,), and more, (E + 1, ...).
 
     Raises:
-        FilterDivergedError: the filter diverges.
+        CleanRunDivergedError: the filter diverges.
     """
     navigator.reset(np.array([0]), initial[None], RunStreams.from_seed(0, 1))
     use = Decision(np.ones(1, dtype=bool))
@@ -158,7 +173,9 @@ def _states(
         nis[epoch], degrees[epoch] = innovation.nis[0], innovation.degrees[0]
         navigator.resolve(use)
         if navigator.diverged[0]:
-            raise diverged_error(0, float(navigator.model.time[navigator.index[0]]))
+            time = navigator.model.time
+            lost = int(np.argmax(~(nis[: epoch + 1] <= LOST_NIS * degrees[: epoch + 1])))
+            raise CleanRunDivergedError(str(diverged_error(0, float(time[epoch]))), float(time[lost]))
         keep()
     parts = [np.stack(part) for part in zip(*states, strict=True)]
     return [*parts[:5], nis, degrees, *parts[5:]]

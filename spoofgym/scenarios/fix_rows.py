@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import position_difference
@@ -19,15 +20,19 @@ UNKNOWN_SIGMA = 99.0
 and a fix of 99 m would tell a filter nothing."""
 UNMEASURED_SIGMA = 1e3
 """1 sigma that the filter believes of a component that was not measured, m and m/s."""
-DEFAULT_SIGMA = {
-    **{"sd_n_m": 2.5, "sd_e_m": 2.5, "sd_d_m": 5.0},
-    **{"sd_vn_mps": 0.3, "sd_ve_mps": 0.3, "sd_vd_mps": 0.5},
-}
-"""1 sigma where the log states none, or 0, which receivers write where they do not know it, m and m/s."""
+DEFAULT_SIGMA = (2.5, 2.5, 5.0, 0.3, 0.3, 0.5)
+"""1 sigma (E, N, U) of a fix whose log states none, or 0, which means that the receiver does not know it, m and m/s."""
+COLUMNS = ("sd_e_m", "sd_n_m", "sd_d_m", "sd_ve_mps", "sd_vn_mps", "sd_vd_mps")
+NEAR_ZERO = 0.1
+"""Latitude and longitude of a log at latitude 0 and longitude 0, degrees."""
 FARTHEST = 50.0
 """Error that a fix may have, m, beside the way that the vehicle may have gone."""
+CONTRADICTION = 50.0
+"""Difference that a velocity may have from the mean one before it and after it, m/s; over less than a second by as much
+more as the positions tell less."""
 FASTEST = 3.0
-"""Speed that the vehicle may have had for a short time, over its median speed."""
+"""Speed that the vehicle may have had for a short time, over its median speed in `AROUND` steps."""
+AROUND = 21
 WILD = 3
 """Fixes in a row that are left out at most: what stays away longer may be true, or the attack that is in the log."""
 
@@ -47,24 +52,38 @@ def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dic
         ValueError: fewer than two rows are left.
     """
     told = table["t_s"] >= start
-    no_position = (table["lat_deg"] == 0.0) & (table["lon_deg"] == 0.0)
+    no_position = _no_position(table["lat_deg"], table["lon_deg"])
     _tell(path, no_position & told, "have lat_deg = lon_deg = 0, no fix, and are left out")
     no_fix = _no_fix(table) & ~no_position
     _tell(path, no_fix & told, f"have a horizontal sigma of {UNKNOWN_SIGMA:g} m or more, no fix, and are left out")
     kept = np.flatnonzero(~no_position & ~no_fix)
     if len(kept) >= 2:
         wild = np.zeros(len(told), dtype=bool)
-        wild[kept] = wild_fixes(table["t_s"][kept], _position(table, kept))
-        _tell(path, wild & told, "lie where the vehicle cannot have been, by the rows around, and are left out")
+        wild[kept] = wild_fixes(table["t_s"][kept], _track(table, kept))
+        rest = kept[~wild[kept]]
+        if "vn_mps" in table:
+            velocity = np.column_stack([table["ve_mps"], table["vn_mps"], -table["vd_mps"]])[rest]
+            wild[rest] = wild_velocities(table["t_s"][rest], _track(table, rest), velocity)
+        _tell(path, wild & told, "have a position or velocity that the rows around make impossible, and are left out")
         kept = kept[~wild[kept]]
     if len(kept) < 2:
-        raise ValueError(f"{path}: 2 rows with a fix are needed, got {len(kept)} of {len(told)}; line 2 is the first")
+        raise ValueError(f"{path}, lines 2 to {len(told) + 1}: 2 rows or more must be a fix, {len(kept)} are")
     return {name: values[kept] for name, values in table.items()}, kept + 2
 
 
-def _position(table: dict[str, Floats], rows: Runs) -> Floats:
+def _track(table: dict[str, Floats], rows: Runs) -> Floats:
+    """Positions of rows from the one in the middle, (k, 3), m ENU."""
     latitude, longitude = np.radians(table["lat_deg"][rows]), np.radians(table["lon_deg"][rows])
-    return np.column_stack([latitude, longitude, table["h_m"][rows]])
+    position = np.column_stack([latitude, longitude, table["h_m"][rows]])
+    return position_difference(position, position[len(rows) // 2])
+
+
+def _no_position(latitude: Floats, longitude: Floats) -> Flags:
+    """Rows of zeros, degrees, unless the others are so near that a vehicle may have been there."""
+    zero = (latitude == 0.0) & (longitude == 0.0)
+    others = np.abs(np.column_stack([latitude, longitude])[~zero])
+    near = len(others) > 0 and bool(np.all(np.median(others, axis=0) < NEAR_ZERO))
+    return np.zeros(len(zero), dtype=bool) if near else zero
 
 
 def _no_fix(table: dict[str, Floats]) -> Flags:
@@ -92,7 +111,8 @@ def known_sigmas(path: Path, rows: dict[str, Floats], lines: Runs, start: float)
         lines: of the file, (k,).
         start: of the log, on the clock of the table, s.
     """
-    zero = {name: rows[name] == 0.0 for name in DEFAULT_SIGMA if name in rows}
+    default = dict(zip(COLUMNS, DEFAULT_SIGMA, strict=True))
+    zero = {name: rows[name] == 0.0 for name in COLUMNS if name in rows}
     any_zero = np.logical_or.reduce([np.zeros(len(lines), dtype=bool), *zero.values()])
     told = np.flatnonzero(any_zero & (rows["t_s"] >= start))
     if len(told):
@@ -101,38 +121,37 @@ def known_sigmas(path: Path, rows: dict[str, Floats], lines: Runs, start: float)
         warn(
             path.parent,
             f"{path.name}: {len(told)} of {len(lines)} rows have a sigma of 0 ({', '.join(which)}), which is taken as "
-            f"unknown: {', '.join(f'{DEFAULT_SIGMA[name]:g}' for name in which)}; the first is line {line}",
+            f"unknown: {', '.join(f'{default[name]:g}' for name in which)}; the first is line {line}",
             line,
         )
     result = dict(rows)
     for name, unknown in zero.items():
-        result[name] = np.where(unknown, DEFAULT_SIGMA[name], rows[name])
+        result[name] = np.where(unknown, default[name], rows[name])
         result[name][rows[name] >= UNKNOWN_SIGMA] = UNMEASURED_SIGMA
     return result
 
 
-def wild_fixes(time: Floats, position: Floats) -> Flags:
+def wild_fixes(time: Floats, track: Floats) -> Flags:
     """Fixes that are out of reach from the one before, where the track goes on from there up to `WILD` fixes later.
 
     Args:
         time: (n,), s, not decreasing.
-        position: latitude rad, longitude rad, height m, (n, 3).
+        track: positions, (n, 3), m ENU.
 
     Returns:
         (n,).
     """
-    track = position_difference(position, position[len(position) // 2])
     step, duration = np.linalg.norm(np.diff(track, axis=0), axis=1), np.diff(time)
-    moved = duration > 0.0
-    speed = FASTEST * float(np.median(step[moved] / duration[moved])) if moved.any() else 0.0
+    usual = np.divide(step, duration, out=np.zeros(len(step)), where=duration > 0.0)
+    speed = FASTEST * median_filter(usual, size=AROUND, mode="mirror")
     number, wild = len(time), np.zeros(len(time), dtype=bool)
 
     def reached(one: int, other: int) -> bool:
         way = float(np.linalg.norm(track[other] - track[one]))
-        return way <= speed * (time[other] - time[one]) + FARTHEST
+        return way <= max(speed[one], speed[other - 1]) * (time[other] - time[one]) + FARTHEST
 
     handled = 0
-    for place in np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1:
+    for place in (np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1).tolist():
         if place <= handled:
             continue
         returns = (other for other in range(place + 1, min(place + WILD + 1, number)) if reached(place - 1, other))
@@ -143,3 +162,22 @@ def wild_fixes(time: Floats, position: Floats) -> Flags:
         elif number - place <= WILD < place:
             wild[place:], handled = True, number
     return wild
+
+
+def wild_velocities(time: Floats, track: Floats, velocity: Floats) -> Flags:
+    """Velocities that contradict the change of position both before and after them.
+
+    Args:
+        time: (n,), s, not decreasing.
+        track: positions, (n, 3), m ENU.
+        velocity: ENU, (n, 3), m/s.
+
+    Returns:
+        (n,).
+    """
+    duration = np.diff(time)
+    way = np.diff(track, axis=0)
+    limit = CONTRADICTION * np.maximum(duration, 1.0)
+    before = np.linalg.norm(velocity[1:] * duration[:, None] - way, axis=1) > limit
+    after = np.linalg.norm(velocity[:-1] * duration[:, None] - way, axis=1) > limit
+    return np.concatenate([[True], before]) & np.concatenate([after, [True]])

@@ -2,8 +2,6 @@
 
 MOST_EPOCHS = 100_000
 """Of a game."""
-RATES = (1e-3, 1e3)
-"""Of a receiver, Hz."""
 SIGMAS = (1e-3, 1e6)
 """Of a fix, m."""
 SPEEDS = (0.1, 1e4)

@@ -13,12 +13,12 @@ from functools import lru_cache
 from spoofgym import validation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario, SimulatedScenario
-from spoofgym.scenarios.limits import MOST_EPOCHS, RATES, SIGMAS
+from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import MASK, range_fix_along
 from spoofgym.sensors.ranging import LIU
-from spoofgym.sensors.receiver import ZERO, Receiver
+from spoofgym.sensors.receiver import RATES, ZERO, Receiver
 from spoofgym.specification import spell
 from spoofgym.tight_scenario import TightScenario
 from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from spoofgym.arrays import Flags, Floats
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios.fix_rows import known_sigmas, usable_rows
 from spoofgym.scenarios.mounting import find_delay, find_mounting
@@ -34,10 +34,10 @@ LIMITS = {
     **{name: (-1_000.0, 1_000.0) for name in IMU_COLUMNS[1:4]},
 }
 """Valid values, inclusive, of columns that have bounds."""
-LONGEST_BRIDGE = 1.0
-"""Time between two epochs of a reference over which it is always interpolated, s."""
+BRIDGED = (1.0, 3.0)
+"""Time between two epochs of a reference over which it is always, and never, interpolated, s."""
 MOST_INTERVALS = 3.0
-"""The same in intervals of the reference."""
+"""The longest time in between these two in usual intervals of the reference."""
 PLAUSIBLE_FORCE = (5.0, 20.0)
 """Median magnitude of a specific force that contains gravity and is in m/s²."""
 
@@ -52,6 +52,7 @@ class Fixes:
         velocity: ENU, (n, 3), m/s; None = not in the log.
         position_sigma: ENU, (n, 3), m; None = not in the log.
         velocity_sigma: ENU, (n, 3), m/s; None = not in the log.
+        lines: of the table that they were read from, (n,); None = they were not.
     """
 
     time: Floats
@@ -59,6 +60,14 @@ class Fixes:
     velocity: Floats | None
     position_sigma: Floats | None
     velocity_sigma: Floats | None
+    lines: Runs | None = None
+
+    def line(self, time: float) -> str:
+        """Where the fix of a time stands in the log, for a message; empty = it does not."""
+        place = int(np.searchsorted(self.time, time))
+        if self.lines is None or place == len(self.time) or self.time[place] != time:
+            return ""
+        return f", line {self.lines[place]} of gnss.csv"
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +109,10 @@ def covered(solution: Fixes, time: Floats) -> Flags:
     """Whether a solution tells the position at times, (n,): they are its own, or lie between two that are near.
 
     Over T seconds with an acceleration of up to a, the cubic of `interpolate` errs by a T²/16 at most: 0.2 m in one
-    second of a car that brakes and turns with 3 m/s², 19 m in ten. So a hole is not bridged. Three intervals are
-    allowed in any case, or a solution that lacks single epochs would hardly tell anything.
+    second of a car that brakes and turns with 3 m/s², 1.7 m in three, 19 m in ten. So a hole is not bridged: what is
+    longer than three usual intervals, as far as these are between 1 and 3 s.
     """
-    widest = max(LONGEST_BRIDGE, MOST_INTERVALS * float(np.median(np.diff(solution.time))))
+    widest = float(np.clip(MOST_INTERVALS * np.median(np.diff(solution.time)), *BRIDGED))
     after = np.clip(np.searchsorted(solution.time, time), 1, len(solution.time) - 1)
     before, following = solution.time[after - 1], solution.time[after]
     inside = (time >= before) & (time <= following) & (following - before <= widest)
@@ -213,7 +222,7 @@ def _read_fixes(path: Path, start: float, delay: float) -> Fixes:
     table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, *SIGMA_COLUMNS], LIMITS)
     rows, lines = usable_rows(path, table, start + delay)
     check_increasing(path, rows["t_s"], lines)
-    return _fixes(known_sigmas(path, rows, lines, start + delay), delay)
+    return replace(_fixes(known_sigmas(path, rows, lines, start + delay), delay), lines=lines)
 
 
 def _read_reference(path: Path, start: float) -> Fixes:

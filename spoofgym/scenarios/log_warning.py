@@ -11,7 +11,7 @@ class LogWarning(UserWarning):
     """A recorded log seems to be wrong, or part of it is left out."""
 
 
-_SHOWN: dict[str, dict[str, Any]] = {}
+_SHOWN: dict[str, dict[Any, Any]] = {}
 """By folder, what `warnings` keeps to show a warning once."""
 
 

@@ -113,7 +113,8 @@ def find_delay(
     _check_yaw(blame, correlation[best])
     if best in (0, len(DELAYS) - 1):
         raise ValueError(
-            f"{owner}: fixes and IMU are {abs(DELAYS[best]):g} s apart or more; set gnss_delay_s (of ranges: imu_delay_s)"
+            f"{owner}: fixes and IMU are {abs(DELAYS[best]):g} s apart or more; set gnss_delay_s (of ranges: "
+            "imu_delay_s)"
         )
     before, at, after = correlation[best - 1 : best + 2]
     vertex = 0.5 * (before - after) / (before - 2.0 * at + after)
@@ -149,7 +150,8 @@ def find_mounting(
 def _check_yaw(blame: str, correlation: float) -> None:
     if not correlation >= MIN_YAW_CORRELATION:
         raise ValueError(
-            f"{blame}: yaw rate and course rate have a correlation of {correlation:.2f}, needed is {MIN_YAW_CORRELATION:g} or more; the vehicle must turn, and gyro and "
+            f"{blame}: yaw rate and course rate have a correlation of {correlation:.2f}, needed is "
+            f"{MIN_YAW_CORRELATION:g} or more; the vehicle must turn, and gyro and "
             f"accelerometer must have the same right-handed axes"
         )
 

@@ -144,9 +144,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path}: has {path.stat().st_size} bytes; valid are {LONGEST} at most")
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ValueError(f"{path}: not valid TOML: {error}") from None
-    except ValueError as error:  # e.g. a number of more digits than Python converts
+    except (ValueError, RecursionError) as error:  # bad TOML or UTF-8, or a number of too many digits
         raise ValueError(f"{path}: not valid TOML: {error}") from None
 
 
@@ -155,7 +153,7 @@ def _key_fault(key: str) -> str | None:
     if key in (*SETTINGS, *REMARKS, NOTES):
         return None
     meant = nearest(key, CLOSE)
-    return f"unknown key {key!r}" + ("" if meant is None else f", did you mean {meant!r}?")
+    return f"unknown key {key!r}" + ("" if meant is None else f" (did you mean {meant!r}?)")
 
 
 def _table_fault(table: str, content: dict[str, Any]) -> str | None:
@@ -166,6 +164,8 @@ def _table_fault(table: str, content: dict[str, Any]) -> str | None:
     for key, value in content.items():
         if not isinstance(value, str) and (meant := nearest(key, SURE)) in SETTINGS:
             return f"{meant!r} must stand above all tables, got {key!r} in [{table}]"
+    if table in (*SETTINGS, *REMARKS):
+        return f"{table} must not be a table"
     return None if table == NOTES else f"unknown table [{table}]"
 
 

@@ -8,9 +8,16 @@ from typing import Any
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.geodesy import displace, position_difference
+from spoofgym.scenarios.clock_steps import without_steps
 from spoofgym.scenarios.log import Fixes, Log
-from spoofgym.scenarios.range_fixes import RangeSolution, check_solved, fixes_of, range_delay, solve_ranges
+from spoofgym.scenarios.range_fixes import (
+    along_fixes,
+    between_fixes,
+    check_solved,
+    fixes_of,
+    range_delay,
+    solve_ranges,
+)
 from spoofgym.scenarios.ranges_log import Ranges, correct, read_ranges
 from spoofgym.scenarios.table import has_table, seconds
 from spoofgym.sensors.geometry import SatelliteGeometry
@@ -22,6 +29,8 @@ UNSTEADY = 0.1
 @dataclass(frozen=True, eq=False)
 class RangeEpochs:
     """Ranges at E epochs, equally spaced on the receiver's clock, in a slot for each of S satellites.
+
+    Steps of that clock have been taken away (`clock_steps`).
 
     An epoch in which the receiver gave nothing has empty slots. A satellite counts where both its code and its range
     rate are usable, and neither is one that a fix of the epoch leaves out as faulty (`without_faults`).
@@ -40,6 +49,7 @@ class RangeEpochs:
         velocity: likewise, ENU, (E, 3), m/s.
         clock: likewise, offset of the receiver's clock as a range, (E,), m.
         clock_drift: likewise, (E,), m/s.
+        clock_jump: variance of what a step of the clock leaves in its offset, (E,), m².
         fix: epochs that have a fix, (n,).
         fixes: of these epochs, on the clock of the IMU.
     """
@@ -56,6 +66,7 @@ class RangeEpochs:
     velocity: Floats
     clock: Floats
     clock_drift: Floats
+    clock_jump: Floats
     fix: Runs
     fixes: Fixes
 
@@ -80,11 +91,13 @@ def range_epochs(log: Log) -> RangeEpochs:
     """
     if not has_table(log.folder, "ranges"):
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) for a filter to take")
-    ranges = steady(read_ranges(log.folder), str(log.folder))
-    solution = solve_ranges(ranges, log.fixes.position[0])
+    start = log.fixes.position[0]
+    ranges = steady(without_steps(read_ranges(log.folder), start), str(log.folder))
+    solution = solve_ranges(ranges, start)
     check_solved(log, ranges, solution)
     delay = range_delay(log, solution)
-    position, velocity, clock, drift = _between_fixes(solution)
+    position, velocity = between_fixes(solution)
+    clock, drift = (along_fixes(values, solution) for values in (solution.clock, solution.clock_drift))
     corrected = correct(ranges, position, clock)
     counts = corrected.geometry.present & solution.used & solution.used_rate
     slots = counts.any(axis=0)
@@ -116,6 +129,7 @@ def range_epochs(log: Log) -> RangeEpochs:
         velocity=velocity,
         clock=clock,
         clock_drift=drift,
+        clock_jump=ranges.clock_jump,
         fix=np.flatnonzero(solution.solved),
         fixes=fixes_of(solution, delay),
     )
@@ -158,21 +172,5 @@ def steady(ranges: Ranges, owner: str) -> Ranges:
         range_rate=spread(ranges.range_rate, 0.0),
         has_rate=spread(ranges.has_rate, False),
         cn0=spread(ranges.cn0, 0.0),
-    )
-
-
-def _between_fixes(solution: RangeSolution) -> tuple[Floats, Floats, Floats, Floats]:
-    """Position, velocity, clock and its drift of every epoch, by straight lines between the epochs with a fix."""
-    solved, every = np.flatnonzero(solution.solved), np.arange(len(solution.solved))
-
-    def line(values: Floats) -> Floats:
-        return np.interp(every, solved, values[solved])
-
-    origin = solution.position[solved[0]]
-    track = position_difference(np.where(solution.solved[:, None], solution.position, origin), origin)
-    return (
-        displace(origin, np.column_stack([line(track[:, a]) for a in range(3)])),
-        np.column_stack([line(solution.velocity[:, a]) for a in range(3)]),
-        line(solution.clock),
-        line(solution.clock_drift),
+        clock_jump=spread(ranges.clock_jump[:, None], 0.0)[:, 0],
     )

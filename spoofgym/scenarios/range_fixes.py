@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios.log import Fixes, Log
 from spoofgym.scenarios.mounting import NO_RANGE_DELAY, find_delay
 from spoofgym.scenarios.ranges_log import CorrectedRanges, Ranges, correct, read_ranges
@@ -39,8 +40,10 @@ class RangeSolution:
     Attributes:
         position: latitude rad, longitude rad, height m, (E, 3).
         clock: offset of the receiver's clock as a range, (E,), m.
+        clock_sigma: (E,), m.
         velocity: ENU, (E, 3), m/s.
         clock_drift: (E,), m/s.
+        clock_drift_sigma: (E,), m/s.
         position_sigma: ENU, (E, 3), m.
         velocity_sigma: ENU, (E, 3), m/s.
         placed: position passed the test of its residuals and has a small sigma, (E,).
@@ -52,8 +55,10 @@ class RangeSolution:
 
     position: Floats
     clock: Floats
+    clock_sigma: Floats
     velocity: Floats
     clock_drift: Floats
+    clock_drift_sigma: Floats
     position_sigma: Floats
     velocity_sigma: Floats
     placed: Flags
@@ -100,8 +105,8 @@ def check_solved(log: Log, ranges: Ranges, solution: RangeSolution) -> None:
         sign = "; with all signs changed they fit" if turned.solved.sum() > LEAST_SHARE * placed else ""
         raise ValueError(
             f"{owner} must give a fix in 2 epochs or more: range_rate_mps gives a velocity in {solved} of {placed} "
-            f"epochs that have a position; the rates must be in m/s and positive where the satellite recedes, - Doppler "
-            f"x c / f{sign}"
+            "epochs that have a position; the rates must be in m/s and positive where the satellite recedes, "
+            f"- Doppler x c / f{sign}"
         )
 
 
@@ -160,8 +165,10 @@ def solve_ranges(ranges: Ranges, start: Floats) -> RangeSolution:
     return RangeSolution(
         position=place.position,
         clock=place.clock,
+        clock_sigma=np.sqrt(place.covariance[:, 3, 3]),
         velocity=rate.velocity,
         clock_drift=rate.clock_drift,
+        clock_drift_sigma=np.sqrt(rate.covariance[:, 3, 3]),
         position_sigma=sigma,
         velocity_sigma=rate_sigma,
         placed=placed,
@@ -169,6 +176,22 @@ def solve_ranges(ranges: Ranges, start: Floats) -> RangeSolution:
         corrected=corrected,
         used=used,
         used_rate=used_rate,
+    )
+
+
+def along_fixes(values: Floats, solution: RangeSolution) -> Floats:
+    """Values of every epoch, (E,), by straight lines between the epochs that are solved."""
+    solved = np.flatnonzero(solution.solved)
+    return np.interp(np.arange(len(values)), solved, values[solved])
+
+
+def between_fixes(solution: RangeSolution) -> tuple[Floats, Floats]:
+    """Position and velocity of every epoch, (E, 3) each, by straight lines between the epochs that are solved."""
+    origin = solution.position[solution.solved][0]
+    track = position_difference(np.where(solution.solved[:, None], solution.position, origin), origin)
+    return (
+        displace(origin, np.column_stack([along_fixes(track[:, a], solution) for a in range(3)])),
+        np.column_stack([along_fixes(solution.velocity[:, a], solution) for a in range(3)]),
     )
 
 

@@ -55,6 +55,7 @@ class Ranges:
         range_rate: (E, S), m/s, positive where the satellite recedes.
         has_rate: where the range rate is usable, (E, S).
         cn0: carrier power over noise density, (E, S), dB-Hz.
+        clock_jump: variance of what a step of the receiver's clock leaves in its offset, (E,), m²; 0 as they are read.
         ephemeris: of the S satellites.
     """
 
@@ -64,6 +65,7 @@ class Ranges:
     range_rate: Floats
     has_rate: Flags
     cn0: Floats
+    clock_jump: Floats
     ephemeris: Ephemeris
 
 
@@ -134,6 +136,7 @@ def read_ranges(folder: str | Path) -> Ranges:
         range_rate=packed(table["range_rate_mps"], 0.0),
         has_rate=packed(trusted, False),
         cn0=packed(table["cn0_dbhz"], 0.0),
+        clock_jump=np.zeros(len(time)),
         ephemeris=ephemeris,
     )
 

@@ -25,6 +25,7 @@ from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.warm_start import ERROR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import CleanRun, clean_run
+from spoofgym.scenarios.fix_rows import DEFAULT_SIGMA, UNMEASURED_SIGMA
 from spoofgym.scenarios.lever_arm import with_velocity_at_imu
 from spoofgym.scenarios.log import Log, read_log, velocity_of
 from spoofgym.scenarios.log_warning import warn
@@ -43,10 +44,6 @@ FIXES = ("phone", "ranges")
 COUPLINGS = ("loose", "tight")
 SIGMA_FLOOR = 0.3
 """Smallest 1 sigma that the filter believes of a fix, m and m/s: timing and lever arm are not known better."""
-UNMEASURED_SIGMA = 1e3
-"""1 sigma of a vertical velocity that is 0 in every fix, m/s: the receiver fills the column without measuring it."""
-DEFAULT_SIGMA = (2.5, 2.5, 5.0, 0.3, 0.3, 0.5)
-"""1 sigma of a fix whose log states none, m and m/s."""
 ALIGNMENT_SIGMA = (math.radians(5.0), math.radians(5.0), math.radians(10.0))
 """Initial attitude error (E, N, U), rad: course against heading, and a mounting known to some degrees."""
 ALIGNMENT_VELOCITY_SIGMA = (0.5, 0.5, 0.5)
@@ -85,7 +82,9 @@ class RecordedFixes(RecordedScenario):
         first = self.alignment.fix
         stop = int(np.searchsorted(self.log.fixes.time, self._end, side="right"))
         if stop - first < 4:
-            raise ValueError(f"scenario {self.name!r}: too few fixes after the alignment at {seconds(self.align_time)} s")
+            raise ValueError(
+                f"scenario {self.name!r}: too few fixes after the alignment at {seconds(self.align_time)} s"
+            )
         return slice(first + 1, stop)
 
     @cached_property
@@ -116,7 +115,7 @@ class RecordedFixes(RecordedScenario):
                 default = np.broadcast_to(self.tuning.measurement_sigma[place : place + 3], size)
                 columns.append(default if stated is None else stated[self._fix])
         sigma = np.maximum(np.hstack(columns), self.sigma_floor)
-        if fixes.velocity is not None and not fixes.velocity[:, 2].any():
+        if fixes.velocity is not None and not fixes.velocity[:, 2].any():  # the receiver fills it without measuring
             sigma[:, 5:] = UNMEASURED_SIGMA
         return sigma
 
@@ -231,7 +230,7 @@ def _no_arm(log: Log) -> Floats:
     if log.lever_arm.any():
         warn(
             log.folder,
-            f"log.toml: coupling=tight does not know antenna_lever_arm_m and takes the antenna for the IMU: positions err "
-            f"by up to {np.linalg.norm(log.lever_arm):.1f} m",
+            "log.toml: coupling=tight does not know antenna_lever_arm_m and takes the antenna for the IMU: positions "
+            f"err by up to {np.linalg.norm(log.lever_arm):.1f} m",
         )
     return np.zeros(3)

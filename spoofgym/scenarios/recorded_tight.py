@@ -89,7 +89,9 @@ class RecordedRanges(RecordedScenario):
         start = int(self.epochs.fix[self.alignment.fix]) + 1
         stop = int(np.searchsorted(self.epochs.time, self._end, side="right"))
         if stop - start < 4:
-            raise ValueError(f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s")
+            raise ValueError(
+                f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s"
+            )
         return self.epochs.part(start, stop)
 
     @property
@@ -129,6 +131,7 @@ class RecordedRanges(RecordedScenario):
             steady,
             time=ranges.time,
             intervals=np.diff(ranges.time, prepend=self.align_time),
+            clock_jump=ranges.clock_jump,
             started=ranges.started,
             noise_variance=np.where(np.tile(ranges.geometry.present, 2), sigma**2, 1.0),
         )

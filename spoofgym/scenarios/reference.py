@@ -38,7 +38,7 @@ def check_reference(log: Log) -> None:
     speed = np.square(velocity[:, :2]).sum()
     delay = float((apart * velocity[:, :2]).sum() / speed) if speed > 0.0 else 0.0
     left = float(np.median(np.hypot(*(apart - delay * velocity[:, :2]).T)))
-    shift = f"; with the times of the reference {-delay:+.2f} s it would be {left:.1f} m" if left < distance / 2.0 else ""
+    shift = f"; with the times of the reference {-delay:+.2f} s it is {left:.1f} m" if left < distance / 2.0 else ""
     warn(
         log.folder,
         f"reference: the fixes lie {distance:.1f} m from it (median), their sigma is {sigma:.1f} m{shift}; likely "

@@ -14,9 +14,9 @@ from spoofgym import validation
 from spoofgym.navigation.adaptation import Adaptation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import SimulatedScenario
-from spoofgym.scenarios.limits import RATES, SPEEDS
+from spoofgym.scenarios.limits import SPEEDS
 from spoofgym.sensors.imu import grade
-from spoofgym.sensors.receiver import Receiver
+from spoofgym.sensors.receiver import RATES, Receiver
 from spoofgym.specification import spell
 from spoofgym.trajectory import Straight, Trajectory, fly
 

@@ -13,8 +13,10 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 
 LARGEST = 2**28
-"""Bytes of text in a table at most, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that unpacks
-to more is not read on."""
+"""Bytes of text in a table at most, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that
+unpacks to more is not read on."""
+MOST_LINES = 10_000_000
+"""In a table: 7 hours of an IMU at 400 Hz."""
 SHOWN = 200
 """Characters of a file that a message quotes at most."""
 
@@ -47,8 +49,8 @@ def read_table(
     """Columns of a CSV file by their names; each optional group is there as a whole or not at all.
 
     Raises:
-        ValueError: the file cannot be read, a column is missing or there twice, or a value is not a finite number or
-            out of its limits; the message names file and line.
+        ValueError: the file cannot be read or is too large, a column is missing or there twice, or a value is not a
+            finite number or out of its limits; the message names file and line.
     """
     lines = _lines(path)
     header = [name.strip() for name in lines[0].split(",")] if lines else []
@@ -117,6 +119,8 @@ def _lines(path: Path) -> list[str]:
             data = file.read(LARGEST + 1)
         if len(data) > LARGEST:
             raise ValueError(f"{path}: has more than {LARGEST} bytes of text, which is the limit; cut the log in parts")
+        if data.count(b"\n") > MOST_LINES:
+            raise ValueError(f"{path}: has more than {MOST_LINES} lines, which is the limit; cut the log in parts")
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: cannot be read: it is no text in UTF-8: {error.reason}") from None

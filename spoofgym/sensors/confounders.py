@@ -35,14 +35,9 @@ class Disturbances:
 
     def __post_init__(self) -> None:
         for name in ("outage_share", "multipath_share"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"disturbances: {name} must be from 0 to 1, got {getattr(self, name)!r}")
+            validation.share("disturbances", name, getattr(self, name))
         for name in ("outage_duration", "multipath_duration", "multipath_sigma"):
-            low, high = getattr(self, name)
-            for value in (low, high):
-                validation.above("disturbances", name, value)
-            if high < low:
-                raise ValueError(f"disturbances: {name} must be a least and a greatest value, got {(low, high)!r}")
+            validation.span("disturbances", name, getattr(self, name))
 
 
 class Confounders:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass, fields
 from os import PathLike
 
@@ -194,15 +195,25 @@ def read_csv(path: str | PathLike[str]) -> Ephemeris:
     Raises:
         ValueError: a column is missing, a value is not a number, a satellite is there twice, or none is healthy.
     """
-    with open(path, newline="", encoding="utf-8") as file:
+    with open(path, newline="", encoding="utf-8-sig") as file:
         rows = list(csv.DictReader(file))
     wanted = ["svid", "sv_health", *COLUMNS.values()]
     missing = [name for name in wanted if not rows or name not in rows[0]]
     if missing:
         raise ValueError(f"ephemeris {path}: columns {', '.join(missing)} are missing")
-    table = np.array([[float(row[name]) for name in wanted] for row in rows])
+    table = np.array([[_number(path, line, name, row[name]) for name in wanted] for line, row in enumerate(rows, 2)])
     table = table[table[:, 1] == 0.0]
     return from_sets(table[:, 0], dict(zip(COLUMNS, table[:, 2:].T, strict=True)))
+
+
+def _number(path: str | PathLike[str], line: int, name: str, text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"ephemeris {path}, line {line}: {name} must be a finite number, got {text!r:.100}")
+    return value
 
 
 def from_sets(satellites: Floats, values: dict[str, Floats]) -> Ephemeris:

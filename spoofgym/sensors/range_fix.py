@@ -17,6 +17,7 @@ from spoofgym.sensors.geometry import SatelliteGeometry, view
 from spoofgym.sensors.least_squares import projection
 from spoofgym.sensors.ranging import RangeErrors, code_variance, gauss_markov, obliquity, troposphere_mapping
 from spoofgym.trajectory import Trajectory
+from spoofgym.validation import written
 
 POSITION = 3
 MASK = math.radians(5.0)
@@ -79,7 +80,7 @@ def range_fix(errors: RangeErrors, geometry: SatelliteGeometry) -> RangeFix:
     without = np.flatnonzero(~np.isfinite(to_fix).all(axis=(1, 2)))
     if len(without):
         raise ValueError(
-            f"range_fix: {len(without)} epochs have no fix, the first at {geometry.time[without[0]]:g} s with "
+            f"range_fix: {len(without)} epochs have no fix, the first at {written(geometry.time[without[0]])} s with "
             f"{int(present[without[0]].sum())} satellites in view; 4 or more are needed"
         )
     interval = float(geometry.time[1] - geometry.time[0])

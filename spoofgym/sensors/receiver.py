@@ -13,6 +13,8 @@ from spoofgym.arrays import Floats
 
 Triple = tuple[float, float, float]
 ZERO: Triple = (0.0, 0.0, 0.0)
+RATES = (1e-3, 1e4)
+"""Least and largest rate, Hz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,14 +40,12 @@ class Receiver:
     lever_arm: Triple = ZERO
 
     def __post_init__(self) -> None:
-        validation.above("receiver", "rate", self.rate)
+        validation.between("receiver", "rate", self.rate, *RATES)
         for name in ("white_sigma", "markov_sigma", "velocity_sigma"):
             values = getattr(self, name)
             if name == "velocity_sigma" and values is None:
                 continue
-            if len(values) != 3:
-                raise ValueError(f"receiver: {name} must be three numbers (E, N, U), got {values!r}")
-            for value in values:
+            for value in validation.triple("receiver", name, values):
                 validation.non_negative("receiver", name, value)
         if any(self.markov_sigma):
             validation.above("receiver", "markov_time", self.markov_time)
@@ -54,12 +54,10 @@ class Receiver:
         validation.non_negative("receiver", "latency", self.latency)
         if self.latency >= self.interval:
             raise ValueError(
-                f"receiver: latency must be less than the interval of {self.interval:g} s, got {self.latency!r}"
+                f"receiver: latency must be less than the interval of {validation.written(self.interval)} s, got "
+                f"{self.latency!r}"
             )
-        if len(self.lever_arm) != 3:
-            raise ValueError(f"receiver: lever_arm must be three numbers (R, F, U), got {self.lever_arm!r}")
-        for value in self.lever_arm:
-            validation.finite("receiver", "lever_arm", value)
+        validation.triple("receiver", "lever_arm", self.lever_arm, "R, F, U")
 
     @property
     def interval(self) -> float:
@@ -85,11 +83,15 @@ class Receiver:
         ratio = imu_rate / self.rate
         if ratio < 1 or abs(ratio - round(ratio)) > 1e-9:
             raise ValueError(
-                f"receiver: rate {self.rate:g} Hz must divide the IMU's {imu_rate:g} Hz into whole samples"
+                f"receiver: rate {validation.written(self.rate)} Hz must divide the IMU's "
+                f"{validation.written(imu_rate)} Hz into whole samples"
             )
         late = self.latency * imu_rate
         if abs(late - round(late)) > 1e-6:
-            raise ValueError(f"receiver: latency {self.latency:g} s must be a multiple of {1 / imu_rate:g} s")
+            raise ValueError(
+                f"receiver: latency {validation.written(self.latency)} s must be a multiple of "
+                f"{validation.written(1.0 / imu_rate)} s"
+            )
         return round(ratio)
 
 

@@ -82,8 +82,16 @@ def test_the_filter_follows_a_part_of_the_satellites_less():
     assert np.all(np.linalg.norm(part, axis=1) > 0.01)
 
 
+@pytest.mark.parametrize("specification", ["partial:ramp:1,numbers=10+99", "tracking-error:partial:ramp:1/numbers=99"])
+def test_a_satellite_that_is_not_in_the_game_is_refused(specification):
+    attack = make_attack(specification)
+    for given in (attack, AttackPool([(attack, 1.0)])):
+        with pytest.raises(ValueError, match=r"numbers must be those of satellites in the game, 1\+10\+.*, got 99"):
+            Simulation(FLIGHT, given)
+
+
 def test_it_can_be_a_member_of_a_pool_and_have_a_tracking_error():
-    names = ("partial:ramp:2,numbers=9", "tracking-error:partial:ramp:1,sigma=0.5", "ramp:2")
+    names = ("partial:ramp:2,numbers=10", "tracking-error:partial:ramp:1,sigma=0.5", "ramp:2")
     pool = AttackPool([(make_attack(name), 1.0) for name in names], clean=0.3)
     assert pool.needs_ranges
     simulation = Simulation(FLIGHT, pool, num_runs=60, seed=0)
@@ -91,7 +99,7 @@ def test_it_can_be_a_member_of_a_pool_and_have_a_tracking_error():
     satellites = FLIGHT.satellites(np.full(60, 5), 0)
     taken = pool.captured(Clock(np.full(60, 5), np.full(60, 62.5)), satellites)
     assert set(pool.member.tolist()) == {-1, 0, 1, 2}
-    np.testing.assert_array_equal(taken[pool.member == 0], satellites[pool.member == 0] == 9)
+    np.testing.assert_array_equal(taken[pool.member == 0], satellites[pool.member == 0] == 10)
     assert np.all(taken[pool.member == 1].sum(axis=1) == 1)
     assert np.all(taken[(pool.member == 2) | (pool.member == -1)])
 

@@ -262,13 +262,13 @@ def test_privileged_state_tells_the_truth_and_is_no_part_of_the_observation() ->
         ({"attacks": "training,clean=0.2"}, ValueError, "clean=0.5, not in"),
         ({"clean": 1.5}, ValueError, "clean must be a share from 0 to 1, got 1.5"),
         ({"outage": -0.1}, ValueError, "outage must be a share from 0 to 1"),
-        ({"error_scale": 0.0}, ValueError, "error_scale must be positive"),
-        ({"exclusion_cost": -1.0}, ValueError, "exclusion_cost must be 0 or more"),
+        ({"error_scale": 0.0}, ValueError, "error_scale must be a finite number greater than 0, got 0.0"),
+        ({"exclusion_cost": -1.0}, ValueError, "exclusion_cost must be a finite number, 0 or more"),
         ({"detectors": ("snapshot", "snapshot")}, ValueError, "each detector can be given once only"),
         ({"depth": 3}, TypeError, "unknown argument 'depth'; valid arguments: scenario, attacks"),
         ({"fidelity": "exact"}, ValueError, "no fidelity 'exact'; valid fidelities: linear, strapdown"),
-        ({"threads": 0}, ValueError, "threads must be 1 or more"),
-        ({"render_mode": "human"}, ValueError, "unknown render_mode 'human'"),
+        ({"threads": 0}, ValueError, "threads must be a whole number, 1 or more"),
+        ({"render_mode": "human"}, ValueError, "render_mode must be one of rgb_array, got 'human'"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, Any], error: type[Exception], message: str) -> None:

@@ -91,6 +91,17 @@ def test_times_are_in_seconds():
     assert result.median_time_to_reuse == 3.0
 
 
+def test_times_are_those_of_the_epochs_where_some_are_missing():
+    """A hole of 30 s within the attack, before the detection, and one of 10 s after its end, before GNSS is used."""
+    times = np.arange(EPOCHS + 1.0)
+    times[12:] += 30.0
+    times[33:] += 10.0
+    played = replace(episodes(game(ATTACK, [(14, 36)])), timeline=Timeline(times, 1.0))
+    result = defender_score(played)
+    assert result.median_time_to_detect == 34.0
+    assert result.median_time_to_reuse == 16.0
+
+
 def test_error_at_detection_is_the_mean_after_the_detecting_decisions():
     error = np.arange(EPOCHS) * 0.5
     assert score(game(ATTACK, [12], error=error), game(ATTACK, [20], error=error)).error_at_detection == 8.0

@@ -1,5 +1,7 @@
 """Metrics on hand-made episodes, and Monte Carlo against the exact play."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -43,6 +45,15 @@ def test_median_time_is_censored_by_the_end(alarms, median):
 
 def test_median_time_is_in_seconds():
     assert attacker_score(episodes([4, 4, 4], interval=0.5)).median_time_to_detect == 2.0
+
+
+def test_median_time_is_that_of_the_epochs_where_some_are_missing():
+    """The first alarm comes in epoch 3, 31 s after epoch 0, because the receiver gave nothing for 28 s."""
+    timeline = Timeline(np.array([20.0, 21.0, 22.0, 51.0, 52.0]), 1.0)
+    played = replace(episodes([3, 3, 4]), timeline=timeline)
+    assert attacker_score(played).median_time_to_detect == 31.0
+    late = replace(played, onset_epoch=np.full(3, 3), alarm_epoch=np.full(3, 4))
+    assert attacker_score(late).median_time_to_detect == 1.0
 
 
 def test_interval_of_a_mean():

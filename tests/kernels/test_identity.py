@@ -16,6 +16,8 @@ from spoofgym.kernels.identity import identity, variant
 from spoofgym.kernels.storage import KernelStorage
 
 FAR = """
+import spoofgym.far as far_module
+
 HEIGHT = 2.0
 TABLE = np.array([1.0, 2.0])
 ROWS = slice(0, 2)

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import spoofgym
 from spoofgym.geodesy import normal_gravity
 from spoofgym.kernels import njit, storage
 
@@ -162,17 +161,15 @@ def fall(folder, count=1):
 
 
 @pytest.mark.slow
-def test_an_updated_checkout_runs_the_new_physics(tmp_path):
+def test_an_updated_checkout_runs_the_new_physics(package_copy):
     """By a constant in another file, of as many letters, with the file's time as it was; two programs at once."""
-    source = Path(spoofgym.__file__).parent
-    shutil.copytree(source, tmp_path / "spoofgym", ignore=shutil.ignore_patterns("__pycache__"))
-    before = fall(tmp_path, 2)
-    geodesy = tmp_path / "spoofgym" / "geodesy.py"
+    before = fall(package_copy.parent, 2)
+    geodesy = package_copy / "geodesy.py"
     text, times = geodesy.read_text(encoding="utf-8"), geodesy.stat()
     changed = text.replace("EQUATORIAL_GRAVITY = 9.78", "EQUATORIAL_GRAVITY = 9.12")
     geodesy.write_text(changed, encoding="utf-8")
     os.utime(geodesy, ns=(times.st_atime_ns, times.st_mtime_ns))
-    after = fall(tmp_path, 2)
+    after = fall(package_copy.parent, 2)
     assert (np.ptp(before, axis=0) == 0.0).all()
     assert (np.ptp(after, axis=0) == 0.0).all()
     # free fall of a microsecond from rest: gravity to the rounding of a velocity of 1e-5 m/s, the Coriolis term beside

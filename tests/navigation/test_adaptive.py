@@ -302,7 +302,7 @@ def test_a_new_episode_has_learnt_nothing():
         ({"guard": "none+clipped"}, "'none' cannot be joined"),
         ({"threshold": 0.0}, "threshold must be a finite number greater than 0"),
         ({"ratio_limits": (4.0, 0.25)}, "ratio_limits must be two positive numbers, least first"),
-        ({"noise_limits": (0.0, 2.0)}, "noise_limits must be two positive numbers"),
+        ({"noise_limits": (0.0, 2.0)}, "noise_limits must be a finite number greater than 0, got 0.0"),
     ],
 )
 def test_wrong_settings_are_refused(arguments, message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,32 @@ HALF = 5
 """Samples to either side over which a range rate is a difference."""
 FRD = [1, 0, 2]
 SIGN = np.array([1.0, 1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A receiver's clock.
+
+    Attributes:
+        offset: at the first epoch, m.
+        drift: m/s.
+        steps: (epoch, seconds) of each step.
+        in_tags: whether the time tags step with the ranges.
+        in_rates: whether the range rates are those of the ranges and show the steps, too.
+    """
+
+    offset: float = CLOCK
+    drift: float = DRIFT
+    steps: tuple[tuple[int, float], ...] = ()
+    in_tags: bool = True
+    in_rates: bool = False
+
+    def stepped(self, epochs: int) -> np.ndarray:
+        """The sum of the steps up to each epoch, (E,), m."""
+        total = np.zeros(epochs)
+        for epoch, seconds in self.steps:
+            total[epoch:] += seconds * speed_of_light
+        return total
 
 
 def drive(turns: int) -> Trajectory:
@@ -60,6 +87,7 @@ def write_drive(
     reference: bool = True,
     silent: tuple[int, int] = (0, 0),
     fault: float = 0.0,
+    clock: Clock = Clock(),
 ) -> Trajectory:
     """A log with ranges at 1 Hz whose white noise is ``noise`` times the filter's.
 
@@ -71,6 +99,7 @@ def write_drive(
         reference: whether the true trajectory is in the log.
         silent: epochs between which the receiver gives nothing.
         fault: of one range in epoch 60, m.
+        clock: of the receiver.
     """
     folder.mkdir(exist_ok=True)
     generator, truth = np.random.default_rng(seed), drive(turns)
@@ -95,7 +124,7 @@ def write_drive(
         tables["reference"] = (header, fixes(np.arange(0, truth.num_steps, RATE // 5), 0.0))
     for name, (columns, values) in tables.items():
         np.savetxt(folder / f"{name}.csv", values, delimiter=",", header=columns, comments="", fmt="%.12f")
-    _write_ranges(folder, truth, index, generator, noise, silent, fault)
+    _write_ranges(folder, truth, index, generator, noise, silent, fault, clock)
     return truth
 
 
@@ -107,14 +136,19 @@ def _write_ranges(
     noise: float,
     silent: tuple[int, int],
     fault: float,
+    oscillator: Clock,
 ) -> None:
     write_ephemeris(folder / "ephemeris.csv")
     numbers = read_csv(folder / "ephemeris.csv").satellites
     true = FIRST + truth.time[index] + DELAY
     ranges, elevation = flights(folder, truth.position[index], true)
     before, after = (flights(folder, truth.position[index + k], true + k / RATE)[0] for k in (-HALF, HALF))
-    rates = (after - before) * RATE / (2 * HALF) + DRIFT
-    clock = CLOCK + DRIFT * np.arange(len(index))
+    rates = (after - before) * RATE / (2 * HALF) + oscillator.drift
+    stepped = oscillator.stepped(len(index))
+    clock = oscillator.offset + oscillator.drift * np.arange(len(index)) + stepped
+    if oscillator.in_rates:
+        rates += np.diff(stepped, prepend=0.0)[:, None]
+    tag = clock if oscillator.in_tags else clock - stepped
     ranges += clock[:, None] + noise * CODE_SIGMA * generator.standard_normal(ranges.shape)
     rates += noise * RATE_SIGMA * generator.standard_normal(rates.shape)
     seen = elevation > math.radians(8.0)
@@ -123,7 +157,7 @@ def _write_ranges(
     lines = ["svid,t_s,pseudorange_m,range_rate_mps,cn0_dbhz"]
     for k in range(len(index)):
         lines += [
-            f"{numbers[s]},{true[k] + clock[k] / speed_of_light:.9f},{ranges[k, s]:.6f},{rates[k, s]:.6f},45"
+            f"{numbers[s]},{true[k] + tag[k] / speed_of_light:.9f},{ranges[k, s]:.6f},{rates[k, s]:.6f},45"
             for s in np.flatnonzero(seen[k])
         ]
     (folder / "ranges.csv").write_text("\n".join(lines) + "\n")

@@ -16,6 +16,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.log import interpolate, read_log
+from spoofgym.scenarios.log_warning import LogWarning
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.simulation import Simulation
 from spoofgym.trajectory import Straight, Turn, fly
@@ -167,7 +168,9 @@ def test_specification_and_environment(folder: Path) -> None:
     name = f"recorded:{folder},grade=tactical,onset=60,horizon=8"
     scenario = make_scenario(name)
     assert scenario.name == name
-    env = gymnasium.make("spoofgym/Spoofer-v0", scenario=name, fidelity="strapdown", knowledge="blind", action="rate")
+    play = {"scenario": name, "fidelity": "strapdown", "knowledge": "blind", "action": "rate"}
+    with pytest.warns(LogWarning, match="an IMU that is worse than its grade"):
+        env = gymnasium.make("spoofgym/Spoofer-v0", **play)
     env.reset(seed=0)
     steps = 0
     done = False

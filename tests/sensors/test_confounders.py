@@ -84,6 +84,16 @@ def test_a_length_in_seconds_becomes_epochs(interval, epochs):
     np.testing.assert_array_equal(length, np.minimum(epochs, 301 - first))
 
 
+def test_a_disturbance_lasts_so_many_seconds_where_epochs_are_missing():
+    """12 s from any epoch on, of which a hole of 30 s after epoch 99 may swallow a part."""
+    times = np.concatenate([np.arange(100.0), 130.0 + np.arange(100.0)])
+    given = Disturbances(outage_share=1.0, outage_duration=(12.0, 12.0), multipath_share=0.0)
+    first, length = stretches(~drawn(given, 300, timeline=Timeline(times, 1.0)).available)
+    expected = [np.count_nonzero((times >= times[k]) & (times < times[k] + 11.5)) for k in first]
+    np.testing.assert_array_equal(length, expected)
+    assert set(np.unique(length)) >= {3, 7, 12}
+
+
 @pytest.mark.parametrize("dimension", [3, 6])
 def test_multipath_is_white_noise_of_its_sigma(dimension):
     """Chi-square with one degree per epoch, axis by axis; nothing outside the burst, nor in the velocity."""

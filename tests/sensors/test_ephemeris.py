@@ -203,6 +203,22 @@ def test_a_table_that_is_not_one_is_refused(tmp_path):
     write_table(tmp_path / "ill.csv", ephemeris, np.array([1, 63]))
     with pytest.raises(ValueError, match="one satellite or more"):
         read_csv(tmp_path / "ill.csv")
+    write_table(tmp_path / "good.csv", ephemeris, np.array([0, 0]))
+    lines = (tmp_path / "good.csv").read_text().splitlines()
+    for bad in ("x", "", "nan"):
+        cells = lines[2].split(",")
+        cells[3] = bad
+        (tmp_path / "bad.csv").write_text("\n".join([*lines[:2], ",".join(cells)]))
+        with pytest.raises(ValueError, match=rf"bad\.csv, line 3: {lines[0].split(',')[3]} must be a finite number"):
+            read_csv(tmp_path / "bad.csv")
+
+
+def test_a_table_with_a_byte_order_mark(tmp_path):
+    ephemeris = synthetic(2)
+    write_table(tmp_path / "table.csv", ephemeris, np.array([0, 0]))
+    text = (tmp_path / "table.csv").read_text()
+    (tmp_path / "table.csv").write_bytes(text.replace("\n", "\r\n").encode("utf-8-sig"))
+    np.testing.assert_array_equal(read_csv(tmp_path / "table.csv").m0, ephemeris.m0)
 
 
 @pytest.mark.parametrize(

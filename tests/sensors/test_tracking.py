@@ -33,3 +33,14 @@ def test_correlated_errors_are_stationary():
         rho = np.exp(-lag / time)
         spread = stats.norm.isf(5e-9) * sigma**2 * np.sqrt((1.0 + rho**2) / number)
         assert abs(np.mean(drawn[20] * drawn[20 + lag]) - sigma**2 * rho) < spread
+
+
+def test_correlation_fades_over_missing_epochs():
+    """Each interval has its own decay: over 30 s with a correlation time of 5 s hardly anything is left."""
+    sigma, time, intervals = 0.7, 5.0, np.array([1.0, 1.0, 30.0, 0.5])
+    drawn = draw_tracking_error(np.random.default_rng(3), (5, 3), sigma, time, intervals)
+    normal = np.random.default_rng(3).standard_normal((5, 3))
+    expected = [sigma * normal[0]]
+    for k, decay in enumerate(np.exp(-intervals / time), 1):
+        expected.append(decay * expected[-1] + sigma * np.sqrt(1.0 - decay**2) * normal[k])
+    np.testing.assert_allclose(drawn, expected, rtol=1e-12)
