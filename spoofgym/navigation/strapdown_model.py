@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import displace
 from spoofgym.immutable import Immutable
-from spoofgym.navigation.interface import Timeline
 from spoofgym.navigation.linear_model import antenna_arm
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
