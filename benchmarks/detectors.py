@@ -10,18 +10,18 @@ out of the sum: solution separation and the ramp bank, whose work grows with the
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.program import give_json, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
@@ -79,24 +79,21 @@ def _row(what: str, microseconds: float, step: float) -> dict[str, Any]:
     return {"what": what, "runs": RUNS, "microseconds": microseconds, "filter_steps": microseconds / step}
 
 
-def main() -> int:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print the rows."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.detectors", description=main.__doc__)
-    parser.add_argument("--json", metavar="FILE", help="write JSON; - = to stdout, and nothing else there")
-    options = parser.parse_args()
+    parser = Parser(prog="python -m benchmarks.detectors", description=main.__doc__)
+    add_json(parser)
+    options = parser.parse_args(arguments)
     offers = set(make_scenario(SCENARIO).offers)
     rows = measure([name for name in DETECTORS if name != UNION and set(make_detector(name).needs) <= offers])
     for row in rows:
         print(
             f"{row['what']:<24}{row['microseconds']:>9.0f} µs{row['filter_steps']:>8.3f} filter steps",
-            file=sys.stderr if options.json == "-" else sys.stdout,
+            file=sys.stderr if options.json == STDOUT else sys.stdout,
         )
     report = {"schema_version": 1, "rows": rows}
-    if options.json == "-":
-        print(json.dumps(report))
-    elif options.json is not None:
-        with open(options.json, "w") as file:
-            json.dump(report, file, indent=2)
+    give_json(report, options.json)
     return 0
 
 

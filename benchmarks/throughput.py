@@ -10,20 +10,20 @@ spoofer does.
 
 from __future__ import annotations
 
-import argparse
-import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
 import spoofgym  # noqa: F401 - registers the environments
+from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
+from spoofgym.program import give_json, program
 
 SECONDS = 1.0
 ROUNDS = 3
@@ -195,11 +195,12 @@ def measure() -> Iterable[dict[str, Any]]:
     yield _row("SB3 PPO, update included", "linear", "vector", 256, 2, "shared", learner_rate())
 
 
-def main() -> int:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print the rows."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.throughput", description=main.__doc__)
-    parser.add_argument("--json", metavar="FILE", help="write JSON; - = to stdout, and nothing else there")
-    options = parser.parse_args()
+    parser = Parser(prog="python -m benchmarks.throughput", description=main.__doc__)
+    add_json(parser)
+    options = parser.parse_args(arguments)
     rows = []
     for row in measure():
         rows.append(row)
@@ -207,7 +208,7 @@ def main() -> int:
             f"{row['what']:<26}{row['fidelity']:<11}{row['mode']:<8}{row['num_envs']:>5} envs  "
             f"{row['threads']} threads  {row['gains']:<7}{row['steps_per_second']:>12,.0f} steps/s"
         )
-        print(line, file=sys.stderr if options.json == "-" else sys.stdout, flush=True)
+        print(line, file=sys.stderr if options.json == STDOUT else sys.stdout, flush=True)
     back = {depth: backtrack_epochs(depth) for depth in (5, 10, 20, 50)}
     with_package, without = import_seconds()
     report = {
@@ -217,14 +218,10 @@ def main() -> int:
         "import": {"spoofgym_seconds": with_package, "dependencies_seconds": without},
     }
     line = "backtrack, in ordinary epochs: " + ", ".join(f"{cost:.1f} for {depth}" for depth, cost in back.items())
-    print(line, file=sys.stderr if options.json == "-" else sys.stdout)
+    print(line, file=sys.stderr if options.json == STDOUT else sys.stdout)
     line = f"import spoofgym: {with_package - without:.2f} s beyond its dependencies ({with_package:.2f} s in all)"
-    print(line, file=sys.stderr if options.json == "-" else sys.stdout)
-    if options.json == "-":
-        print(json.dumps(report))
-    elif options.json is not None:
-        with open(options.json, "w") as file:
-            json.dump(report, file, indent=2)
+    print(line, file=sys.stderr if options.json == STDOUT else sys.stdout)
+    give_json(report, options.json)
     return 0
 
 

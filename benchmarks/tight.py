@@ -10,17 +10,17 @@ one process, and the ratio of the medians counts.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import make_detector
 from spoofgym.navigation.interface import Demands
+from spoofgym.program import give_json, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
@@ -89,12 +89,13 @@ def _observe_without(simulation: Simulation) -> Any:
     return epoch
 
 
-def main() -> int:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Print the rows."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.tight", description=main.__doc__)
-    parser.add_argument("--json", metavar="FILE", help="write JSON; - = to stdout, and nothing else there")
-    options = parser.parse_args()
-    out = sys.stderr if options.json == "-" else sys.stdout
+    parser = Parser(prog="python -m benchmarks.tight", description=main.__doc__)
+    add_json(parser)
+    options = parser.parse_args(arguments)
+    out = sys.stderr if options.json == STDOUT else sys.stdout
     rows = []
     shared, own = (Demands(), "shared"), (Demands(excludes=True), "own")
     for fidelity, (demands, gains) in (("linear", shared), ("linear", own), ("strapdown", own)):
@@ -117,12 +118,7 @@ def main() -> int:
                 flush=True,
             )
     report = {"schema_version": 1, "rows": rows}
-    if options.json == "-":
-        print(json.dumps(report))
-    elif options.json is not None:
-        path = Path(options.json)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(report, indent=2) + "\n")
+    give_json(report, options.json)
     return 0
 
 

@@ -21,6 +21,7 @@ from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
 from spoofgym.evaluation.report import attacker_row
 from spoofgym.optimum import expected_play
 from spoofgym.scenario import Scenario
+from train.trained_on import tell_what_is_new
 
 
 @dataclass(frozen=True)
@@ -66,13 +67,18 @@ class Evaluation:
         return rows
 
     def check_layouts(self, policies: list[LearnedSpoofer]) -> None:
-        """Refuse policies that were trained for another observation.
+        """Refuse policies that were trained for another observation, and tell which play something else.
 
         Raises:
-            ValueError: naming the policy and the first entry that differs.
+            ValueError: naming the policy and the first entry that differs, or what cannot be built of its game.
         """
         for policy in policies:
-            policy.check_layout(self._game(policy, 1).fields)
+            try:
+                fields = self._game(policy, 1).fields
+            except ValueError as error:
+                raise ValueError(f"policy {policy.name!r}: {error}") from error
+            policy.check_layout(fields)
+        tell_what_is_new(policies, self.scenario, self.fidelity, self.detectors)
 
     def _baselines(self) -> list[Baseline]:
         if self.threshold is not None:

@@ -7,7 +7,7 @@ stand out. Both see one vector; the actor's network is given its first part only
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from spoofgym.envs.defender_game import EXCLUDE
 from spoofgym.envs.range_features import SLOT_FIELD
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
+from train import settings as limits
 from train.imitation import imitate
 from train.ppo import LAST_RATE, arrays
 
@@ -72,6 +73,33 @@ class Settings:
     reward_scale: float = 0.1
     privileged: bool = True
     validation_episodes: int = 4000
+
+    def __post_init__(self) -> None:
+        """Refuse a number that is none of a training.
+
+        Raises:
+            ValueError: naming the setting.
+        """
+        limits.check(
+            self,
+            {
+                "lanes": limits.whole(1, limits.MOST_LANES),
+                "clean": limits.real(0.0, 1.0),
+                "minibatches": limits.whole(1, 10_000),
+                "epochs": limits.whole(1, 1000),
+                "learning_rate": limits.real(0.0, 1.0),
+                "gamma": limits.real(0.0, 1.0),
+                "gae_lambda": limits.real(0.0, 1.0),
+                "clip_range": limits.real(0.0, 10.0),
+                "entropy": limits.real(0.0, 1e6),
+                "hidden": limits.whole(1, 4096),
+                "imitate": limits.SWITCH,
+                "privileged": limits.SWITCH,
+                "critic_games": limits.whole(0, 10_000),
+                "reward_scale": limits.real(0.0, 1e9),
+                "validation_episodes": limits.whole(1, 10_000_000),
+            },
+        )
 
 
 class PrivilegedVecEnv(SB3VecEnv):
@@ -254,16 +282,3 @@ def export(learner: PPO, config: DefenderConfig, folder: Path) -> LearnedDefende
     vector: DefenderVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
     layout = tuple(field.name for field in vector.game.fields)
     return LearnedDefender(folder.resolve().name, config, layout, *arrays(layers))
-
-
-def environment_arguments(config: DefenderConfig) -> dict[str, Any]:
-    """The arguments that rebuild the environment, for ``config.json``.
-
-    Raises:
-        ValueError: a part that has no specification.
-    """
-    arguments = asdict(config)
-    texts = [arguments["scenario"], arguments["attacks"], *arguments["detectors"]]
-    if not all(isinstance(text, str) for text in texts):
-        raise ValueError("a training run needs scenario, attacks and detectors by their specifications")
-    return arguments

@@ -29,6 +29,7 @@ from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, d
 from spoofgym.evaluation.report import defenders_report
 from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
+from train.trained_on import tell_what_is_new
 
 POPULATIONS = {"training": False, "held-out": True}
 """Populations of attacks, and whether a defender never sees them in training."""
@@ -261,6 +262,7 @@ def evaluate_defenders(
     names = [policy.name for policy in policies]
     if len(set(names)) < len(names):
         raise ValueError(f"run folders of one name cannot be told apart: {', '.join(names)}")
+    tell_what_is_new(policies, scenario, fidelity)
     published = listed_for(scenario, PUBLISHED, console)
     tuned = listed_for(scenario, tuned_for(scenario.name), console)
     kinds: dict[str, str] = {}

@@ -12,6 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from spoofgym import files
 from train.defenders import LEARNED_MEAN
 from train.presentation import number
 
@@ -177,4 +178,4 @@ def defenders_figure(report: dict[str, Any], path: Path) -> None:
     axes.legend(loc="upper right", fontsize=8, frameon=True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    figure.savefig(path)
+    files.write_figure(path, figure)

@@ -13,8 +13,8 @@ bound as a figure. Every attacker meets the same noise. A table goes to the term
 from __future__ import annotations
 
 import argparse
-import json
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +25,16 @@ from agents.defenders import parse
 from agents.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
+from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
+from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import FIDELITIES, Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
-from train.arguments import above_one, count, picture, seed_number
 from train.attackers import Evaluation
 from train.defenders import POPULATIONS, evaluate_defenders
 from train.defenders_presentation import defenders_figure, defenders_tables
@@ -56,7 +58,7 @@ FIGURES = {"attackers": attackers_figure, "defenders": defenders_figure, "matrix
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = argparse.ArgumentParser(
+    result = Parser(
         prog="python -m train.evaluate",
         description="Evaluate spoofers against a detector, beside baselines and the exact optimum; with --defender, "
         "defenders against populations of spoofers; with --matrix, every detector against every attack.",
@@ -85,43 +87,36 @@ def parser() -> argparse.ArgumentParser:
     add("--episodes", type=count,
         help="games of each player (default: 20000 linear, 1000 strapdown; defenders and matrix 4000)")
     add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
-    add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
-    add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
-    add("--figure", type=picture, metavar="FILE", help="write a figure: PNG, SVG or PDF by its ending")
+    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_json(result)
+    add_figure(result)
     return result
 
 
-def main(arguments: list[str] | None = None) -> int:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    console = Console(stderr=options.json == "-")
-    try:
-        _show(_report(options, console), options, console)
-    except (ValueError, ArithmeticError, FileNotFoundError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False)
-        return 2
+    terminal = console(stderr=options.json == STDOUT)
+    _show(_report(options, terminal), options, terminal)
     return 0
 
 
-def _show(report: dict[str, Any], options: argparse.Namespace, console: Console) -> None:
-    """The table, then JSON and figures where they are asked for."""
-    console.print(TABLES[report["kind"]](report))
-    if options.json == "-":
-        print(json.dumps(report, allow_nan=False))
-    elif options.json is not None:
-        path = Path(options.json)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
-        console.print(f"rows in {path}", markup=False)
+def _show(report: dict[str, Any], options: argparse.Namespace, terminal: Console) -> None:
+    """The table, then JSON and figures where they are asked for; where one of them fails, the others are given."""
+    steps: list[Callable[[], object]] = [
+        lambda: terminal.print(TABLES[report["kind"]](report)),
+        lambda: give_json(report, options.json),
+    ]
     if options.figure is not None:
-        options.figure.parent.mkdir(parents=True, exist_ok=True)
-        FIGURES[report["kind"]](report, options.figure)
-        console.print(f"figure in {options.figure}", markup=False)
+        steps.append(lambda: FIGURES[report["kind"]](report, options.figure))
     if options.roc is not None:
-        options.roc.parent.mkdir(parents=True, exist_ok=True)
         attacks = list(dict.fromkeys(curve["attack"] for curve in report["curves"]))
-        curves_figure(report, _roc_attack(options.roc_attack, attacks), options.roc)
-        console.print(f"curves in {options.roc}", markup=False)
+        steps.append(lambda: curves_figure(report, _roc_attack(options.roc_attack, attacks), options.roc))
+    do_all(*steps)
+    for what, path in (("rows", options.json), ("figure", options.figure), ("curves", options.roc)):
+        if path is not None and path != STDOUT:
+            terminal.print(f"{what} in {path}", soft_wrap=True)
 
 
 def _roc_attack(asked: str | None, attacks: list[str]) -> str:
@@ -133,7 +128,7 @@ def _roc_attack(asked: str | None, attacks: list[str]) -> str:
     return asked
 
 
-def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
+def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     fidelity = options.fidelity or scenario.fidelities[0]
     scenario.check_fidelity(fidelity)
@@ -144,9 +139,9 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     if not options.matrix and (options.arl0 is not None or options.roc is not None):
         raise ValueError("--arl0 and --roc are of the matrix: they go with --matrix")
     if options.matrix:
-        return _matrix(options, scenario, fidelity, console)
+        return _matrix(options, scenario, fidelity, terminal)
     if options.defender:
-        return _defenders(options, scenario, fidelity, console)
+        return _defenders(options, scenario, fidelity, terminal)
     given = options.detector or ["snapshot"]
     detectors = [calibrated(make_detector(name), scenario, fidelity) for name in given]
     if isinstance(scenario, RecordedScenario):
@@ -165,11 +160,11 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
         exact_threshold(scenario, detectors),
     )
     attacks = [make_attack(text) for text in options.attack]
-    rows = evaluation.rows(policies, attacks, console)
+    rows = evaluation.rows(policies, attacks, terminal)
     return attackers_report(scenario, fidelity, detectors, rows)
 
 
-def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, console: Console) -> dict[str, Any]:
+def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, terminal: Console) -> dict[str, Any]:
     if options.defender or not scenario.random:
         raise ValueError("--matrix is of detectors and attacks in a simulated scenario: no --defender, no recorded log")
     policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
@@ -185,10 +180,10 @@ def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, cons
     )
     if options.roc is not None:
         _roc_attack(options.roc_attack, matrix.names(options.attack, policies))
-    return matrix.report(options.detector or (), options.attack, policies, console)
+    return matrix.report(options.detector or (), options.attack, policies, terminal)
 
 
-def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, console: Console) -> dict[str, Any]:
+def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, terminal: Console) -> dict[str, Any]:
     if options.attacker or options.attack or options.detector:
         raise ValueError("--defender is evaluated on populations: it goes without --attacker, --attack and --detector")
     policies, given = [], []
@@ -202,7 +197,7 @@ def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, c
     populations = options.population or tuple(POPULATIONS)
     episodes = options.episodes or DEFENDER_EPISODES
     return evaluate_defenders(
-        scenario, fidelity, policies, given, populations, episodes, options.seed, options.threads, console
+        scenario, fidelity, policies, given, populations, episodes, options.seed, options.threads, terminal
     )
 
 

@@ -19,6 +19,7 @@ from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
 from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack, watch_policy
 from spoofgym.scenario import Scenario
+from train.trained_on import tell_what_is_new
 
 DETECTORS = (
     "snapshot",
@@ -110,6 +111,7 @@ class Matrix:
                     f"policy {policy.name!r} sees the statistics of its own detector (knowledge 'full'): the matrix "
                     "takes policies that know less, 'blind' or 'shadow'"
                 )
+        tell_what_is_new(policies, self.scenario, self.fidelity)
         with console.status("attacks"):
             scripted = self._attacks(attacks)
         with console.status("thresholds"):

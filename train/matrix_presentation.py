@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 from scipy import stats
 
+from spoofgym import files
 from spoofgym.arrays import Floats
 
 ENSEMBLE = "ensemble"
@@ -129,7 +130,7 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
         fontsize=11,
     )
     figure.supxlabel("\n".join(ensemble_notes(report)), fontsize=8, ha="left", x=0.01)
-    figure.savefig(path)
+    files.write_figure(path, figure)
 
 
 def _heat(
@@ -218,7 +219,7 @@ def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     det.set_title("DET; bands and bars: 95 % intervals", loc="left", fontsize=11)
     for axes in (roc, det):
         axes.grid(color="#e6e6e6", linewidth=0.6)
-    figure.savefig(path)
+    files.write_figure(path, figure)
 
 
 def _area(curve: dict[str, Any]) -> float:

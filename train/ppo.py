@@ -1,4 +1,4 @@
-"""PPO on the native vector environment: its settings, its checkpoints, and what it leaves behind.
+"""PPO on the native vector environment: its settings, and the policy it leaves behind.
 
 A minibatch of SB3's default size trains at 4,000 steps/s, one of a few thousand at 30,000 and more: the update is the
 cost, so the rollout is one whole game of many lanes, cut into a few large minibatches.
@@ -6,11 +6,9 @@ cost, so the rollout is one whole game of many lanes, cut into a few large minib
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -19,13 +17,13 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
-from agents.learned import CONFIG_FILE, LearnedSpoofer
+from agents.learned import LearnedSpoofer
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import SpooferVectorEnv
+from train import settings as limits
 from train.expected_alarm import ExpectedAlarmVectorEnv, alarm_probability_is_known
 
-CHECKPOINT_FILE = "checkpoint.pt"
 LAST_RATE = 0.02
 """Share of the learning rate at which its fall ends: the last rollout overshoots the number of steps."""
 
@@ -58,14 +56,27 @@ class Settings:
     max_grad_norm: float = 10.0
     hidden: int = 64
 
+    def __post_init__(self) -> None:
+        """Refuse a number that is none of a training.
 
-def environment_arguments(config: SpooferConfig) -> dict[str, Any]:
-    """The arguments that rebuild the environment, for ``config.json``."""
-    arguments = asdict(config)
-    parts = [arguments[key] for key in ("scenario", "detector", "response")]
-    if not all(isinstance(part, str) for part in parts) or not isinstance(arguments["shadow"], str | None):
-        raise ValueError("a training run needs scenario, detector, response and shadow by their specifications")
-    return arguments
+        Raises:
+            ValueError: naming the setting.
+        """
+        limits.check(
+            self,
+            {
+                "lanes": limits.whole(1, limits.MOST_LANES),
+                "trials": limits.whole(1, 1000),
+                "minibatches": limits.whole(1, 10_000),
+                "epochs": limits.whole(1, 1000),
+                "learning_rate": limits.real(0.0, 1.0),
+                "log_std": limits.real(-20.0, 20.0),
+                "gae_lambda": limits.real(0.0, 1.0),
+                "clip_range": limits.real(0.0, 10.0),
+                "max_grad_norm": limits.real(0.0, 1e6),
+                "hidden": limits.whole(1, 4096),
+            },
+        )
 
 
 def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: Path) -> PPO:
@@ -98,38 +109,12 @@ def _lanes(config: SpooferConfig, lanes: int) -> SpooferVectorEnv:
     return SpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
 
 
-def write_config(folder: Path, config: SpooferConfig, settings: Settings, seed: int, steps: int) -> None:
-    """Write ``config.json``: what the policy was trained on and how."""
-    content = {
-        "environment": environment_arguments(config),
-        "learner": asdict(settings),
-        "seed": seed,
-        "steps": steps,
-    }
-    (folder / CONFIG_FILE).write_text(json.dumps(content, indent=2) + "\n")
-
-
-def read_config(folder: Path) -> dict[str, Any]:
-    """What ``config.json`` of a run folder says: environment, learner, seed and steps.
-
-    Raises:
-        ValueError: it is missing or damaged.
-    """
-    try:
-        content = json.loads((folder / CONFIG_FILE).read_text())
-        return {key: content[key] for key in ("environment", "learner", "seed", "steps")}
-    except (OSError, KeyError, json.JSONDecodeError) as error:
-        raise ValueError(f"{folder / CONFIG_FILE} cannot be read: {error!r}") from error
-
-
 def export(learner: PPO, config: SpooferConfig, folder: Path) -> LearnedSpoofer:
-    """The learner's policy as plain arrays, also written into ``folder``."""
+    """The learner's policy as plain arrays, named after its run folder."""
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
     vector: SpooferVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
     layout = tuple(field.name for field in vector.game.fields)
-    policy = LearnedSpoofer(folder.resolve().name, config, layout, *arrays(layers))
-    policy.save(folder)
-    return policy
+    return LearnedSpoofer(folder.resolve().name, config, layout, *arrays(layers))
 
 
 Arrays = tuple[NDArray[np.float32], ...]
@@ -142,24 +127,3 @@ def arrays(layers: Sequence[torch.nn.Module]) -> tuple[Arrays, Arrays]:
         tuple(layer.weight.detach().numpy().copy() for layer in linear),
         tuple(layer.bias.detach().numpy().copy() for layer in linear),
     )
-
-
-def save_checkpoint(learner: PPO, folder: Path) -> None:
-    """Everything that goes on learning, without a pickle: tensors and numbers only."""
-    temporary = folder / f".{CHECKPOINT_FILE}"
-    torch.save({"parameters": learner.get_parameters(), "num_timesteps": learner.num_timesteps}, temporary)
-    temporary.replace(folder / CHECKPOINT_FILE)
-
-
-def load_checkpoint(learner: PPO, folder: Path) -> None:
-    """Put a learner where a checkpoint left off.
-
-    Raises:
-        FileNotFoundError: there is none.
-    """
-    path = folder / CHECKPOINT_FILE
-    if not path.is_file():
-        raise FileNotFoundError(f"{folder} has no {CHECKPOINT_FILE} to resume from")
-    state = torch.load(path, weights_only=True)
-    learner.set_parameters(state["parameters"], exact_match=True, device="cpu")
-    learner.num_timesteps = state["num_timesteps"]

@@ -9,6 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.table import Table
 
+from spoofgym import files
+
 BASELINE, LEARNED, BOUND = "#9a9a9a", "#0072b2", "#d55e00"
 BASELINES = ("none", "random", "best-ramp", "closed-form", "optimum", "upper-bound")
 
@@ -124,4 +126,4 @@ def attackers_figure(report: dict[str, Any], path: Path) -> None:
     axes.set_title(f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}", pad=16)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    figure.savefig(path)
+    files.write_figure(path, figure)

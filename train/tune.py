@@ -9,47 +9,49 @@ the same games and prints the best. What it finds stands in `agents.defenders.TU
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from agents.defenders import grid
+from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.defence import play_response
 from spoofgym.evaluation.defence_metrics import defender_score
+from spoofgym.program import do_all, give_json, program
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
-from train.arguments import count, seed_number
 from train.defenders import world_of
 
 SEED = 1_000_000_000
 """Of game 0: none of these games is one of a training, a validation or an evaluation."""
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the program; returns its exit status."""
-    parser = argparse.ArgumentParser(prog="python -m train.tune", description="Tune the classical defenders.")
-    add = parser.add_argument
-    add("--scenario", default="foi-drive", help="(default: %(default)s)")
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(prog="python -m train.tune", description="Tune the classical defenders.")
+    add = result.add_argument
+    add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
     add("--episodes", type=count, default=4000, help="games of each defender (default: %(default)s)")
     add("--seed", type=seed_number, default=SEED, help="of game 0 (default: %(default)s)")
-    add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
-    add("--json", type=Path, metavar="FILE", help="write the rows")
-    options = parser.parse_args(arguments)
-    console = Console()
-    try:
-        scenario = make_scenario(options.scenario)
-        world = world_of(scenario, "training", "linear", options.threads, (), grid())
-    except ValueError as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False)
-        return 2
+    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_json(result)
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    terminal = console(stderr=options.json == STDOUT)
+    scenario = make_scenario(options.scenario)
+    world = world_of(scenario, "training", "linear", options.threads, (), grid())
     rows: list[dict[str, Any]] = []
     for defender in grid():
-        with console.status(defender.name):
+        with terminal.status(defender.name):
             games = play_response(
                 world,
                 make_detector(defender.detector).name,
@@ -68,11 +70,16 @@ def main(arguments: list[str] | None = None) -> int:
             }
         )
     rows.sort(key=lambda row: float(row["mean_error_m"]))
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        report = {"schema_version": 1, "kind": "tuning", "scenario": scenario.name, "rows": rows}
-        options.json.write_text(json.dumps(report, indent=2) + "\n")
-    table = Table(title=f"{scenario.name}: best of {len(rows)} defenders, {options.episodes} games each", box=None)
+    report = {"schema_version": 1, "kind": "tuning", "scenario": scenario.name, "rows": rows}
+    table = tuning_table(report, options.episodes)
+    do_all(lambda: terminal.print(table), lambda: give_json(report, options.json))
+    return 0
+
+
+def tuning_table(report: dict[str, Any], episodes: int) -> Table:
+    """The best of a ``"tuning"`` report for the terminal."""
+    rows = report["rows"]
+    table = Table(title=f"{report['scenario']}: best of {len(rows)} defenders, {episodes} games each", box=None)
     for title in ("detector", "response", "mean error, m", "clean out"):
         table.add_column(title, justify="left" if title in ("detector", "response") else "right")
     for row in rows[:12]:
@@ -83,8 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
             f"{row['mean_error_m']:.3f} ±{0.5 * (high - low):.3f}",
             f"{row['clean_exclusion_fraction']:.4f}",
         )
-    console.print(table)
-    return 0
+    return table
 
 
 if __name__ == "__main__":

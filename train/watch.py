@@ -1,4 +1,4 @@
-"""What is seen of a training while it runs, and what is kept of it on the way."""
+"""What is seen of a training while it runs, and the legs that it consists of."""
 
 from __future__ import annotations
 
@@ -13,13 +13,25 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 CHECKPOINTS = 10
+LONGEST_LEG = 250_000
+
+
+def leg_of(steps: int) -> int:
+    """Steps between two checkpoints of a run: a tenth of it, no more than `LONGEST_LEG`."""
+    return max(1, min(steps // CHECKPOINTS, LONGEST_LEG))
 
 
 class Watch(BaseCallback):
-    """Progress bar over a whole run, and a call after every tenth of it.
+    """Progress bar over a whole run, and a checkpoint after every leg.
+
+    A leg begins with new games in all lanes and random numbers of its own, which the seed of the run, the learner and
+    the steps that it has played decide. So what comes after a checkpoint does not depend on what was before it but
+    through the learner, and a run that is resumed there goes on as if nothing had stopped it.
 
     Attributes:
         steps_before: steps of the learners before the present one, which the bar counts, too.
+        stream: numbers that tell the present learner's random numbers from those of others: the seed of the run, and
+            which learner of the run it is.
     """
 
     def __init__(
@@ -29,13 +41,14 @@ class Watch(BaseCallback):
 
         Args:
             steps: of all learners.
-            console: where the bar is shown.
+            console: where the bar is shown, if it is a terminal.
             result: what the bar says of a learner.
-            keep: called after every tenth of the run, between two rollouts.
+            keep: called after every leg, between two rollouts.
         """
         super().__init__()
         self._steps, self._result, self._keep = steps, result, keep
         self.steps_before = 0
+        self.stream: tuple[int, ...] = (0, 0)
         self._progress = Progress(
             TextColumn("training"),
             BarColumn(bar_width=20),
@@ -45,9 +58,10 @@ class Watch(BaseCallback):
             TimeRemainingColumn(),
             TextColumn("{task.fields[result]}"),
             console=console,
+            disable=not console.is_terminal,
         )
         self._task = self._progress.add_task("training", total=steps, result="")
-        self._next_checkpoint = steps // CHECKPOINTS
+        self._end_of_leg: int | None = None
 
     def start(self) -> None:
         """Show the bar."""
@@ -56,6 +70,13 @@ class Watch(BaseCallback):
     def stop(self) -> None:
         """Leave the terminal as it was."""
         self._progress.stop()
+
+    def learn(self, learner: PPO, steps: int, name: str = "ppo") -> None:
+        """Let a learner play up to ``steps`` in all, in legs."""
+        done = learner.num_timesteps
+        if steps > done:
+            self._end_of_leg = None
+            learner.learn(steps - done, callback=self, reset_num_timesteps=done == 0, tb_log_name=name)
 
     def _on_step(self) -> bool:
         return True
@@ -67,9 +88,23 @@ class Watch(BaseCallback):
         )
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps >= self._next_checkpoint:
-            self._next_checkpoint = self.num_timesteps + self._steps // CHECKPOINTS
+        if self._end_of_leg is not None and self.num_timesteps < self._end_of_leg:
+            return
+        if self._end_of_leg is not None:
             self._keep(self.model)  # type: ignore[arg-type]
+        begin_leg(self.model, self.stream)
+        self._end_of_leg = self.num_timesteps + leg_of(self._steps)
+
+
+def begin_leg(learner: BaseAlgorithm, stream: tuple[int, ...]) -> None:
+    """New games in all lanes, and random numbers that nothing decides but the stream and the steps played."""
+    numbers = np.random.SeedSequence((*stream, learner.num_timesteps)).generate_state(2, np.uint64)
+    learner.set_random_seed(int(numbers[0] >> 32))
+    environment = learner.env
+    assert environment is not None
+    environment.seed(int(numbers[1] >> 1))
+    learner._last_obs = environment.reset()  # type: ignore[assignment]
+    learner._last_episode_starts = np.ones(environment.num_envs, dtype=bool)
 
 
 def mean_return(learner: BaseAlgorithm) -> float:

@@ -11,10 +11,9 @@ the score with the right filter has a paired interval.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,8 @@ from agents.learned import LearnedSpoofer
 from agents.scripted import OffsetSequence
 from spoofgym.arrays import Floats
 from spoofgym.calibration import calibrated
+from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot
@@ -36,11 +37,11 @@ from spoofgym.evaluation.metrics import NORMAL_95, attacker_score, undetected_er
 from spoofgym.evaluation.monte_carlo import Episodes
 from spoofgym.evaluation.report import SCHEMA_VERSION, detector_entry
 from spoofgym.optimum import bounded_optimum, expected_play
+from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario, SimulatedScenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import GRADES
 from spoofgym.specification import Specification, spell
-from train.arguments import count, seed_number
 from train.attackers import Evaluation
 from train.presentation import number
 
@@ -159,11 +160,11 @@ def ratio_of_means(values: Floats, reference: Floats) -> tuple[float, tuple[floa
     return ratio, (ratio - half, ratio + half)
 
 
-def player_rows(name: str, play: Player, shadows: list[Shadow], console: Console) -> list[dict[str, Any]]:
+def player_rows(name: str, play: Player, shadows: list[Shadow], terminal: Console) -> list[dict[str, Any]]:
     """A spoofer with the right shadow filter, then with each wrong one."""
     rows, right = [], None
     for shadow in [RIGHT, *shadows]:
-        with console.status(f"{name}, {shadow.label}"):
+        with terminal.status(f"{name}, {shadow.label}"):
             result = play(shadow)
         errors = undetected_error(result.episodes)
         right = errors if right is None else right
@@ -221,7 +222,7 @@ def _half(interval: list[float]) -> float:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = argparse.ArgumentParser(
+    result = Parser(
         prog="python -m train.wrong_shadow",
         description="What a spoofer's score loses when its shadow filter is not the victim's.",
     )
@@ -231,29 +232,24 @@ def parser() -> argparse.ArgumentParser:
     add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
     add("--episodes", type=count, default=4000, help="games of each row (default: %(default)s)")
     add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
-    add("--threads", type=count, default=2, help="of the simulation (default: %(default)s)")
-    add("--json", type=Path, metavar="FILE", help="write the rows as JSON")
+    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_json(result)
     return result
 
 
-def main(arguments: list[str] | None = None) -> int:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    console = Console()
-    try:
-        report = _report(options, console)
-    except (ValueError, FileNotFoundError) as error:
-        Console(stderr=True).print(f"error: {error}", style="red", markup=False)
-        return 2
-    console.print(wrong_shadow_table(report))
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
-        console.print(f"rows in {options.json}", markup=False)
+    terminal = console(stderr=options.json == STDOUT)
+    report = _report(options, terminal)
+    do_all(lambda: terminal.print(wrong_shadow_table(report)), lambda: give_json(report, options.json))
+    if options.json not in (None, STDOUT):
+        terminal.print(f"rows in {options.json}", soft_wrap=True)
     return 0
 
 
-def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
+def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     shadows = wrong_shadows(scenario)
     detectors = [calibrated(make_detector(options.detector), scenario)]
@@ -281,7 +277,7 @@ def _report(options: argparse.Namespace, console: Console) -> dict[str, Any]:
     evaluation.check_layouts(policies)
     players = [(policy.name, policy_player(evaluation, policy)) for policy in policies]
     players.append(("optimum", optimum_player(evaluation, threshold)))
-    rows = [row for name, play in players for row in player_rows(name, play, shadows, console)]
+    rows = [row for name, play in players for row in player_rows(name, play, shadows, terminal)]
     return {
         "schema_version": SCHEMA_VERSION,
         "kind": "wrong-shadow",

@@ -13,18 +13,18 @@ alarms; their sum and the accuracy P_D (eq 12) are the same.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spoofgym import validation
+from spoofgym import files, validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks import make_attack
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, count, seed_number
 from spoofgym.detectors.acna import (
     SONG_JUMP_EPOCHS,
     SONG_JUMP_THRESHOLD,
@@ -35,6 +35,7 @@ from spoofgym.detectors.acna import (
 from spoofgym.detectors.base import Detector
 from spoofgym.navigation.facts import ODOMETER
 from spoofgym.navigation.interface import Demands, Epoch
+from spoofgym.program import do_all, give_json, program
 from spoofgym.responses.exclude import Exclude
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
@@ -230,27 +231,18 @@ def draw(grids: dict[str, Rates], path: Path) -> None:
         axes[1, column].legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False, ncols=4)
     axes[0, 0].set(ylabel="accuracy")
     axes[1, 0].set(ylabel="false alarms + missed")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
-
-
-def _picture(text: str) -> Path:
-    path = Path(text)
-    if path.suffix.lower() not in PICTURES:
-        raise argparse.ArgumentTypeError(f"a figure's name ends in {', '.join(PICTURES)}, got {text!r}")
-    return path
+    files.write_figure(path, figure)
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.acna_study", description=main.__doc__)
+    result = Parser(prog="python -m spoofgym.evaluation.acna_study", description=main.__doc__)
     add = result.add_argument
     add("--scenario", default="song-robot", help="with an odometer (default: %(default)s)")
-    add("--runs", type=int, default=10, help="per pair (default: %(default)s)")
-    add("--seed", type=int, default=0, help="of run 0 (default: %(default)s)")
-    add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
-    add("--figure", type=_picture, metavar="FILE",
-        help="write a figure: PNG, SVG or PDF by its ending (needs matplotlib)")
+    add("--runs", type=count, default=10, help="per pair (default: %(default)s)")
+    add("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_json(result)
+    add_figure(result)
     return result
 
 
@@ -270,33 +262,32 @@ def _report(scenario: str, runs: int, seed: int, grids: dict[str, Rates]) -> dic
     }
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Study windows and thresholds of ACNA: a table, and JSON and a figure where they are asked for."""
-    command = parser()
-    options = command.parse_args(arguments)
+    options = parser().parse_args(arguments)
     common = (options.runs, options.seed)
-    try:
-        grids = {test: study(options.scenario, test, *common) for test in TESTS}
-        report = _report(options.scenario, *common, grids)
-    except ValueError as error:
-        command.error(str(error))
-    out = sys.stderr if options.json == "-" else sys.stdout
-    print(f"{options.scenario}, {options.runs} runs per pair from seed {options.seed}\n", file=out)
-    print("| test | pair | threshold, m | accuracy | false alarms | missed |", file=out)
-    print("|---|---|---|---|---|---|", file=out)
-    for row in report["rows"]:
-        print(_line(row), file=out)
-    if options.json == "-":
-        print(json.dumps(report, allow_nan=False))
-    elif options.json is not None:
-        path = Path(options.json)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(report, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        print(f"rows in {path}", file=out)
+    grids = {test: study(options.scenario, test, *common) for test in TESTS}
+    report = _report(options.scenario, *common, grids)
+    out = sys.stderr if options.json == STDOUT else sys.stdout
+    lines = [
+        f"{options.scenario}, {options.runs} runs per pair from seed {options.seed}\n",
+        "| test | pair | threshold, m | accuracy | false alarms | missed |",
+        "|---|---|---|---|---|---|",
+        *map(_line, report["rows"]),
+    ]
+    steps: list[Callable[[], object]] = [
+        lambda: print("\n".join(lines), file=out),
+        lambda: give_json(report, options.json),
+    ]
     if options.figure is not None:
-        draw(grids, options.figure)
-        print(f"figure in {options.figure}", file=out)
+        steps.append(lambda: draw(grids, options.figure))
+    do_all(*steps)
+    for what, path in (("rows", options.json), ("figure", options.figure)):
+        if path is not None and path != STDOUT:
+            print(f"{what} in {path}", file=out)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

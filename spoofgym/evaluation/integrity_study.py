@@ -9,7 +9,7 @@ Stanford diagrams of both levels.
 
 from __future__ import annotations
 
-import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +18,14 @@ import numpy as np
 from scipy import special
 
 from spoofgym.arrays import Flags, Floats
+from spoofgym.command_line import Parser, add_figure, count, seed_number
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
 from spoofgym.evaluation.stanford import draw_side_by_side
 from spoofgym.navigation.tight import TightNavigator
+from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
@@ -180,12 +182,13 @@ def draw(flight: Flight, replica: Replica, path: Path) -> None:
     draw_side_by_side(diagrams, path, f"Replica of the true signals that climbs at {replica.words}: vertical error")
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Compare protection levels from P and from solution separation, clean and spoofed."""
-    parser = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.integrity_study", description=main.__doc__)
-    parser.add_argument("--runs", type=_count, default=200, help="of each replica (default: %(default)s)")
-    parser.add_argument("--seed", type=_seed, default=0, help="of run 0 (default: %(default)s)")
-    parser.add_argument("--figure", type=_figure, help="write the picture to this file: .png, .svg, .pdf")
+    parser = Parser(prog="python -m spoofgym.evaluation.integrity_study", description=main.__doc__)
+    parser.add_argument("--runs", type=count, default=200, help="of each replica (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_figure(parser)
     options = parser.parse_args(arguments)
     print(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")
     print(
@@ -198,27 +201,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(row(replica, user, flight.result(user), flight.level[user]), flush=True)
         if replica == SLOW and options.figure is not None:
             draw(flight, replica, options.figure)
-
-
-def _count(text: str) -> int:
-    value = int(text) if text.isdecimal() else 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number, 1 or more, got {text!r}")
-    return value
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"expected a whole number, 0 or more, got {text!r}")
-    return int(text)
-
-
-def _figure(text: str) -> Path:
-    path = Path(text)
-    if path.suffix not in (".png", ".svg", ".pdf") or path.is_dir():
-        raise argparse.ArgumentTypeError(f"expected a file that ends with .png, .svg or .pdf, got {text!r}")
-    return path
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -6,21 +6,23 @@ responses with ``--figure FILE``.
 
 from __future__ import annotations
 
-import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from spoofgym import validation
+from spoofgym import files, validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import EAST, heading
+from spoofgym.command_line import Parser, add_figure, count, seed_number
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.navigation.interface import Clock
+from spoofgym.program import program
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
@@ -163,21 +165,18 @@ def draw(courses: dict[str, Course], path: Path) -> None:
     axes.set(xlim=(0.0, time[-1]), ylim=(0.25, 1000.0))
     axes.grid(alpha=0.25)
     axes.legend(loc="lower right", fontsize=8, framealpha=0.95)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
+    files.write_figure(path, figure)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Play a patient spoofer against responses: a table, and a figure where one is asked for."""
-    parser = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.patient_spoofer", description=main.__doc__)
-    parser.add_argument("--runs", type=int, default=400, help="per response (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of run 0 (default: %(default)s)")
-    parser.add_argument("--figure", type=Path, help="write the picture to this file (needs matplotlib)")
+    parser = Parser(prog="python -m spoofgym.evaluation.patient_spoofer", description=main.__doc__)
+    parser.add_argument("--runs", type=count, default=400, help="per response (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_figure(parser)
     options = parser.parse_args(arguments)
-    try:
-        courses = {response: play(response, options.runs, options.seed) for response in RESPONSES}
-    except ValueError as error:
-        parser.error(str(error))
+    courses = {response: play(response, options.runs, options.seed) for response in RESPONSES}
     print(f"{PatientSpoofer(onset=ONSET).name} on {SCENARIO}, {options.runs} runs from seed {options.seed}\n")
     print("| response | final error, m | greatest error, m | reset | first reset | spoofed fixes used |")
     print("|---|---|---|---|---|---|")
@@ -185,7 +184,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(row(response, course))
     if options.figure is not None:
         draw({name: courses[name] for name in DRAWN}, options.figure)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

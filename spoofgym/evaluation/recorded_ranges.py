@@ -7,22 +7,22 @@ simulation is the game with onset i, so that one pass over the drive plays them 
 
 from __future__ import annotations
 
-import argparse
-import json
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats
+from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.evaluation.recorded import SETTLING
 from spoofgym.geodesy import position_difference
+from spoofgym.program import do_all, give_json, program
 from spoofgym.scenarios.log import Fixes, interpolate, read_log
 from spoofgym.scenarios.range_epochs import RangeEpochs
 from spoofgym.scenarios.recorded import UNMEASURED_SIGMA, recorded
@@ -332,23 +332,18 @@ def tables(report: dict[str, Any]) -> list[str]:
     return lines
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Filters side by side on a drive with raw ranges, clean and pulled."""
-    parser = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.recorded_ranges", description=main.__doc__)
+    parser = Parser(prog="python -m spoofgym.evaluation.recorded_ranges", description=main.__doc__)
     parser.add_argument("path", metavar="PATH", help="folder of a log with ranges.csv and ephemeris.csv")
-    parser.add_argument("--json", metavar="FILE", help="write JSON; - = to stdout, and nothing else there")
+    add_json(parser)
     options = parser.parse_args(arguments)
-    try:
-        report = side_by_side(options.path)
-    except ValueError as error:
-        parser.error(str(error))
-    if options.json == "-":
-        print(json.dumps(report, allow_nan=False))
-        return
-    print("\n".join(tables(report)))
-    if options.json is not None:
-        Path(options.json).write_text(json.dumps(report, indent=2, allow_nan=False) + "\n")
+    report = side_by_side(options.path)
+    out = sys.stderr if options.json == STDOUT else sys.stdout
+    do_all(lambda: print("\n".join(tables(report)), file=out), lambda: give_json(report, options.json))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

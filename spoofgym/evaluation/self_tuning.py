@@ -6,19 +6,20 @@ under their 3 m/s ramp, under each guard and with both kinds of receiver noise, 
 
 from __future__ import annotations
 
-import argparse
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.profiles import Ramp
+from spoofgym.command_line import Parser, count, seed_number
 from spoofgym.navigation.adaptation import GUARDS
 from spoofgym.navigation.adaptive import AdaptiveNavigator
 from spoofgym.navigation.interface import Demands
+from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.shadmehri_flight import NOISES, SIGMA
 from spoofgym.simulation import Simulation
@@ -138,31 +139,29 @@ def _detection(course: Course, attacked: Flags, kept: Flags, threshold: float) -
     return f"{100.0 * detected.mean():.0f} %, {np.median(latency):.1f} s"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
     """Play the self-tuning filter clean and under a ramp, with each guard and both noises, and print tables."""
-    parser = argparse.ArgumentParser(prog="python -m spoofgym.evaluation.self_tuning", description=main.__doc__)
-    parser.add_argument("--runs", type=int, default=400, help="per filter and noise (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of run 0 (default: %(default)s)")
-    parser.add_argument("--window", type=int, default=50, help="w, fixes (default: %(default)s)")
+    parser = Parser(prog="python -m spoofgym.evaluation.self_tuning", description=main.__doc__)
+    parser.add_argument("--runs", type=count, default=400, help="per filter and noise (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    parser.add_argument("--window", type=count, default=50, help="w, fixes (default: %(default)s)")
     parser.add_argument("--rate", type=float, default=3.0, help="of the ramp, m/s per axis (default: %(default)s)")
     parser.add_argument("--guards", nargs="+", default=list(GUARDS), help="default: %(default)s")
     options = parser.parse_args(arguments)
-    try:
-        validation.whole("self_tuning", "runs", options.runs, 1)
-        for noise in NOISES:
-            print(f"noise {noise}, w = {options.window}, {options.rate:g} m/s, {options.runs} runs\n")
-            print(
-                "| guard | ended by α < 0 | factor on Q at 20 s [90 %] | error, m | √HPH', m | √R at 20 s, m "
-                "| √R at 25 s, spoofed, m | false alarms per epoch | detected at 25.9 | detected at 1e-3 per epoch |"
-            )
-            print("|---|---|---|---|---|---|---|---|---|---|")
-            for guard in (COMMON, *options.guards):
-                common = (options.window, options.runs, options.seed)
-                print(row(guard, play(guard, noise, 0.0, *common), play(guard, noise, options.rate, *common)))
-            print()
-    except ValueError as error:
-        parser.error(str(error))
+    for noise in NOISES:
+        print(f"noise {noise}, w = {options.window}, {options.rate:g} m/s, {options.runs} runs\n")
+        print(
+            "| guard | ended by α < 0 | factor on Q at 20 s [90 %] | error, m | √HPH', m | √R at 20 s, m "
+            "| √R at 25 s, spoofed, m | false alarms per epoch | detected at 25.9 | detected at 1e-3 per epoch |"
+        )
+        print("|---|---|---|---|---|---|---|---|---|---|")
+        for guard in (COMMON, *options.guards):
+            common = (options.window, options.runs, options.seed)
+            print(row(guard, play(guard, noise, 0.0, *common), play(guard, noise, options.rate, *common)))
+        print()
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym import validation
+from spoofgym import files, validation
 from spoofgym.arrays import Flags, Floats, Runs
 
 NOMINAL, MISLEADING, HAZARDOUS, UNAVAILABLE = range(4)
@@ -159,8 +159,7 @@ def draw_side_by_side(diagrams: dict[str, StanfordDiagram], path: Path, heading:
     if heading:
         figure.suptitle(heading)
     figure.colorbar(ScalarMappable(norm, COLOUR_MAP), ax=list(panels), label="epochs", shrink=0.85, pad=0.02)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
+    files.write_figure(path, figure)
 
 
 def _panel(axes: Any, diagram: StanfordDiagram, norm: Any) -> None:

@@ -9,14 +9,15 @@ A threshold that theory gives has an ARL₀ without an interval. What was found 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from typing import Any
 
 from spoofgym.calibration import calibrated_all
+from spoofgym.command_line import STDOUT, Parser, above_one, add_json
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
@@ -68,35 +69,27 @@ def fitting(scenario: Scenario) -> list[str]:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = argparse.ArgumentParser(
+    result = Parser(
         prog="python -m spoofgym.evaluation.thresholds",
         description="Thresholds of detectors at several average run lengths between false alarms.",
     )
     add = result.add_argument
     add("--scenario", default="liu-flight", help="in which they hold (default: %(default)s)")
     add("--detector", action="append", help="repeatable (default: every family that fits the scenario)")
-    add("--arl0", type=float, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
-    add("--json", metavar="FILE", help="write the rows as JSON; - = to stdout, and nothing else there")
+    add("--arl0", type=above_one, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
+    add_json(result)
     return result
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    try:
-        scenario = make_scenario(options.scenario)
-        rows = threshold_rows(scenario, options.detector or fitting(scenario), options.arl0)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    for row in rows:
-        print(_line(row), file=sys.stderr if options.json == "-" else sys.stdout)
+    scenario = make_scenario(options.scenario)
+    rows = threshold_rows(scenario, options.detector or fitting(scenario), options.arl0)
     report = {"schema_version": 1, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
-    if options.json == "-":
-        print(json.dumps(report))
-    elif options.json is not None:
-        with open(options.json, "w", encoding="utf-8") as file:
-            file.write(json.dumps(report, indent=2) + "\n")
+    out = sys.stderr if options.json == STDOUT else sys.stdout
+    do_all(lambda: print("\n".join(map(_line, rows)), file=out), lambda: give_json(report, options.json))
     return 0
 
 

@@ -1,0 +1,115 @@
+"""The command line of the programs: a parser that tells a mistake in one line, and types of arguments."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import math
+from pathlib import Path
+from typing import NoReturn
+
+from spoofgym import files
+
+STDOUT = "-"
+MOST_THREADS = 1024
+
+
+class Parser(argparse.ArgumentParser):
+    """An `argparse` parser whose errors take one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Tell what is wrong and exit with status 2."""
+        self.exit(2, f"error: {message} (--help lists the options)\n")
+
+
+def count(text: str) -> int:
+    """A whole number of 1 or more; ``1e6`` and ``1_000_000`` are understood."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}") from None
+    if not math.isfinite(value) or value != int(value) or value < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number of 1 or more, got {text!r}")
+    return int(value)
+
+
+def threads(text: str) -> int:
+    """A number of threads."""
+    value = count(text)
+    if value > MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"expected {MOST_THREADS} threads or fewer, got {text!r}")
+    return value
+
+
+def seed_number(text: str) -> int:
+    """A whole number of 0 or more."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}") from None
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"a seed is 0 or more, got {text!r}")
+    return value
+
+
+def above_one(text: str) -> float:
+    """A finite number greater than 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number, got {text!r}") from None
+    if not 1.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a finite number greater than 1, got {text!r}")
+    return value
+
+
+def picture(text: str) -> Path:
+    """A file that can be written, whose ending names a picture format."""
+    path = Path(text)
+    if path.suffix.lower() not in files.PICTURES:
+        raise argparse.ArgumentTypeError(f"a figure's name ends in {', '.join(files.PICTURES)}, got {text!r}")
+    if importlib.util.find_spec("matplotlib") is None:
+        raise argparse.ArgumentTypeError("a figure needs matplotlib: pip install 'spoofgym[report]'")
+    return output(text)
+
+
+def output(text: str) -> Path:
+    """A file that can be written."""
+    if not text or text.endswith("/"):
+        raise argparse.ArgumentTypeError(f"expected the name of a file, got {text!r}")
+    try:
+        files.check_file(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return Path(text)
+
+
+def json_output(text: str) -> Path | str:
+    """A file that can be written, or ``-`` for stdout."""
+    return text if text == STDOUT else output(text)
+
+
+def run_folder(text: str) -> Path:
+    """A folder that exists or can be made, and can be written."""
+    try:
+        files.check_folder(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return Path(text)
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """The option ``--json`` of a program that prints rows."""
+    parser.add_argument(
+        "--json",
+        type=json_output,
+        metavar="FILE",
+        help="write the rows as JSON; - = to stdout, and nothing else there",
+    )
+
+
+def add_figure(parser: argparse.ArgumentParser) -> None:
+    """The option ``--figure`` of a program that draws."""
+    parser.add_argument(
+        "--figure", type=picture, metavar="FILE", help="write a figure: PNG, SVG or PDF by its ending"
+    )

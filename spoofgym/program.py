@@ -1,0 +1,120 @@
+"""What every program does alike: how it ends, and how it says why.
+
+A mistake of the user or a failure is told in one line on stderr. The exit status is 0, 2 where the arguments are wrong,
+1 where the work failed, and 130 after Ctrl-C. The library itself never calls this.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from spoofgym import files
+
+FAILURE, USAGE, INTERRUPTED, CLOSED_PIPE = 1, 2, 130, 141
+
+
+class Program(Protocol):
+    """A program that can be called with a command line; None = that of the process."""
+
+    def __call__(self, arguments: Sequence[str] | None = None) -> int:
+        """Run it; returns its exit status."""
+
+
+def program(main: Callable[[Sequence[str] | None], int | None]) -> Program:
+    """Make a function of a command line a program: exceptions become one line and an exit status.
+
+    An error of another kind than those below is a fault of the program and keeps its traceback.
+    """
+
+    @functools.wraps(main)
+    def entry(arguments: Sequence[str] | None = None) -> int:
+        _print_everything()
+        try:
+            try:
+                return main(arguments) or 0
+            finally:
+                if sys.stdout is not None:
+                    sys.stdout.flush()  # a full disk or a closed pipe shows here, not when the interpreter ends
+        except KeyboardInterrupt:
+            say("interrupted")
+            return INTERRUPTED
+        except BrokenPipeError:
+            _leave_stdout()
+            return CLOSED_PIPE
+        except (ValueError, ArithmeticError, FileNotFoundError) as error:
+            say(f"error: {_words(error)}")
+            return USAGE
+        except OSError as error:
+            _leave_stdout()
+            say(f"error: {_words(error)}")
+            return FAILURE
+        except (RuntimeError, ImportError, MemoryError) as error:
+            say(f"error: {_words(error)}")
+            return FAILURE
+
+    return entry
+
+
+def say(text: str) -> None:
+    """One line to stderr, however many the text has."""
+    print(" ".join(text.split()), file=sys.stderr, flush=True)
+
+
+def do_all(*steps: Callable[[], object]) -> None:
+    """Take every step, though one fails: a full disk or a closed pipe must not cost what goes elsewhere.
+
+    Raises:
+        Exception: the first failure, when all steps are done.
+    """
+    failures = []
+    for step in steps:
+        try:
+            step()
+        except Exception as error:
+            failures.append(error)
+    if failures:
+        raise failures[0]
+
+
+def give_json(report: Any, destination: str | Path | None) -> None:
+    """Give a report as JSON: to stdout where the destination is ``-``, else to a file; None = nowhere.
+
+    Raises:
+        ValueError: a number that is not finite.
+        OSError: the file cannot be written.
+    """
+    if destination is None:
+        return
+    if str(destination) == "-":
+        print(json.dumps(report, allow_nan=False), flush=True)
+    else:
+        files.write_json(destination, report)
+
+
+def _words(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
+    return str(error) or type(error).__name__
+
+
+def _print_everything() -> None:
+    """A character that the terminal does not have is printed as a question mark, and no error."""
+    reconfigure = getattr(sys.stdout, "reconfigure", None)
+    if reconfigure is not None:
+        reconfigure(errors="replace")
+
+
+def _leave_stdout() -> None:
+    """Write nothing more to a stdout that fails: the interpreter would try again when it ends."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
