@@ -68,7 +68,7 @@ def restore(learner: PPO, state: State) -> None:
             policy.optimizer.state[parameter] = {key: value.clone() for key, value in moments.items()}
     learner.num_timesteps = state["steps"]
     games = ({"r": gain, "l": length} for gain, length in state["games"].tolist())
-    learner.ep_info_buffer = deque(games, maxlen=GAMES)
+    learner.ep_info_buffer, learner.ep_success_buffer = deque(games, maxlen=GAMES), deque(maxlen=GAMES)
 
 
 def mean_gain(state: State) -> float:
@@ -104,8 +104,11 @@ def load(path: Path) -> State:
     with files.reading(path):
         with zipfile.ZipFile(path) as archive:
             size = sum(item.file_size for item in archive.infolist())
-        if size > LARGEST:
-            raise ValueError(f"it unpacks to {size} bytes, a checkpoint to {LARGEST} at most")
+            if size > LARGEST:
+                raise ValueError(f"it unpacks to {size} bytes, a checkpoint to {LARGEST} at most")
+            spoilt = archive.testzip()  # PyTorch itself does not look at the checksums
+        if spoilt is not None:
+            raise ValueError(f"the checksum of {spoilt} is wrong")
         content = torch.load(path, weights_only=True, map_location="cpu")
         if not isinstance(content, dict):
             raise ValueError(f"expected a dictionary, got {type(content).__name__}")

@@ -25,7 +25,7 @@ from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from train import defender, defenders, evaluate, tune
 from train.defender import VALIDATION_FILE, VALIDATION_SEED
-from train.ppo import CHECKPOINT_FILE
+from train.run_folder import CHECKPOINT_FILE
 
 pytestmark = pytest.mark.xdist_group("defender programs")  # one worker: the run folder is made once
 
@@ -171,17 +171,18 @@ def test_a_resumed_run_refuses_other_settings_and_stays_as_it_is(run, tmp_path, 
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == kept
 
 
-def test_an_interrupted_beginning_leaves_a_folder_that_can_be_used_again(tmp_path, capsys, monkeypatch):
+def test_a_run_that_was_interrupted_at_its_beginning_starts_again(run, tmp_path, capsys, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     folder = tmp_path / "short"
     with monkeypatch.context() as patch:
         patch.setattr(defender, "begin", interrupted)
-        assert defender.main([*SHORT, "--imitate", "true", "--steps", str(STEPS), "--out", str(folder)]) == 130
-    assert "there is nothing to go on from" in " ".join(capsys.readouterr().err.split())
-    assert defender.main([*SHORT, "--imitate", "false", "--steps", str(STEPS), "--out", str(folder)]) == 0
+        assert defender.main([*SHORT, "--steps", str(STEPS), "--out", str(folder)]) == 130
+    assert "go on with: python -m train.defender --resume" in capsys.readouterr().err
     LearnedDefender.load(folder)
+    assert defender.main(["--resume", "--out", str(folder)]) == 0
+    assert (folder / VALIDATION_FILE).read_bytes() == (run / VALIDATION_FILE).read_bytes()
 
 
 def test_equal_seeds_train_equal_policies(run, tmp_path):
@@ -420,7 +421,7 @@ def test_tuning_ranks_the_grid(tmp_path, monkeypatch, capsys):
         (defender, ["--detector", "snapshot", "--attacks", "rain"], "unknown attack 'rain'; valid names: "),
         (defender, ["--detector", "snapshot", "--detector", "snapshot"], "each detector can be given once only"),
         (defender, ["--scenario", "foi-drive:horizon=0"], "horizon must be 1 epoch or more, got 0"),
-        (defender, ["--resume", "--out", "nowhere"], "nowhere has no checkpoint.pt to resume from"),
+        (defender, ["--resume", "--out", "nowhere"], "nowhere holds no run to resume: it has no config.json"),
         (tune, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: "),
     ],
 )
