@@ -19,7 +19,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong and exit with status 2."""
-        self.exit(2, f"error: {message} (--help lists the options)\n")
+        self.exit(2, f"error: {' '.join(message.split())} (--help lists the options)\n")
 
 
 def count(text: str) -> int:

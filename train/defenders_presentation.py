@@ -14,7 +14,7 @@ from rich.text import Text
 
 from spoofgym import files
 from train.defenders import LEARNED_MEAN
-from train.presentation import number
+from train.presentation import number, plain
 
 COLOURS = {
     "learned": "#0072b2",
@@ -82,7 +82,7 @@ def _blank(title: str, gap: int = 2) -> Table:
 
 def _table(title: str, key: str, rows: list[dict[str, Any]], bold: list[str]) -> Table:
     table = _blank(title, 1)
-    table.add_column(key, overflow="fold", max_width=26)
+    table.add_column(key, overflow="fold")
     for heading, _, _ in COLUMNS:
         table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
@@ -101,7 +101,7 @@ def _comparisons(report: dict[str, Any], learned: list[str]) -> Table:
         table.caption += f"; better: so many of the {len(learned)}, each by itself"
     table.caption_justify = "left"
     present = [held_out for held_out in POPULATIONS if any(item["held_out"] == held_out for item in report["rows"])]
-    table.add_column("baseline", overflow="fold", max_width=30)
+    table.add_column("baseline", overflow="fold")
     for held_out in present:
         table.add_column(POPULATIONS[held_out], justify="right", no_wrap=True)
         if len(learned) > 1:
@@ -131,7 +131,7 @@ def _gaps(report: dict[str, Any]) -> Table:
     table = _blank(f"gap from {first['from']} to {first['to']}, closed")
     closed = {(item["defender"], item["held_out"]): item["closed"] for item in report["gaps"]}
     present = sorted({item["held_out"] for item in report["gaps"]})
-    table.add_column("defender", overflow="fold", max_width=30)
+    table.add_column("defender", overflow="fold")
     for held_out in present:
         table.add_column(POPULATIONS[held_out], justify="right", no_wrap=True)
     for name in dict.fromkeys(item["defender"] for item in report["gaps"]):
@@ -169,12 +169,12 @@ def defenders_figure(report: dict[str, Any], path: Path) -> None:
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(axis="x", color="#e4e4e4", zorder=0)
-    axes.set_yticks(range(len(rows)), [row["defender"] for row in rows], fontsize=8)
+    axes.set_yticks(range(len(rows)), [plain(row["defender"]) for row in rows], fontsize=8)
     for tick, row in zip(axes.get_yticklabels(), rows, strict=True):
         tick.set_fontweight("bold" if report["kinds"][row["defender"]] == "learned" else "normal")
     axes.set_xlabel("mean horizontal error of the real-time output, m (95 % interval)")
     words = "attacks that no defender was trained on" if held_out else "attacks of the training population"
-    axes.set_title(f"{report['scenario']}, {report['fidelity']}: {words}")
+    axes.set_title(f"{plain(report['scenario'])}, {report['fidelity']}: {words}")
     axes.legend(loc="upper right", fontsize=8, frameon=True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

@@ -17,6 +17,7 @@ from scipy import stats
 
 from spoofgym import files
 from spoofgym.arrays import Floats
+from train.presentation import plain
 
 ENSEMBLE = "ensemble"
 COLUMNS = 12
@@ -118,7 +119,7 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
     labels = [names[name] for name in detectors]
     _heat(above, labels, attacks, detected, 100.0 * detected, "Blues", 1.0)
     above.set_title(
-        f"{report['scenario']}: games with an alarm, %, at ARL₀ = {report['arl0']:g} epochs\n"
+        f"{plain(report['scenario'])}: games with an alarm, %, at ARL₀ = {report['arl0']:g} epochs\n"
         "(none: clean games, false alarms)",
         loc="left",
         fontsize=11,
@@ -145,8 +146,9 @@ def _heat(
         if np.isfinite(text[i, j]):
             ink = "white" if brightness[i, j] < 0.45 else "black"
             axes.text(j, i, _figure(float(text[i, j])), ha="center", va="center", fontsize=9, color=ink)
-    axes.set_xticks(range(len(columns)), columns, rotation=50, ha="right", rotation_mode="anchor", fontsize=9)
-    axes.set_yticks(range(len(rows)), rows, fontsize=9)
+    names = list(map(plain, columns))
+    axes.set_xticks(range(len(names)), names, rotation=50, ha="right", rotation_mode="anchor", fontsize=9)
+    axes.set_yticks(range(len(rows)), list(map(plain, rows)), fontsize=9)
     axes.set_xticks(np.arange(0.5, len(columns) - 1), minor=True)
     axes.set_yticks(np.arange(0.5, len(rows) - 1), minor=True)
     axes.grid(which="minor", color="white", linewidth=0.8)
@@ -206,7 +208,7 @@ def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     roc.set_xscale("log")
     roc.set_xlabel("games with a false alarm")
     roc.set_ylabel("games with the attack detected")
-    roc.set_title(f"ROC, {attack}, {report['scenario']}", loc="left", fontsize=11)
+    roc.set_title(plain(f"ROC, {attack}, {report['scenario']}"), loc="left", fontsize=11)
     roc.legend(fontsize=7.5, loc="upper left", framealpha=0.9)
     ticks = stats.norm.ppf(DET_TICKS)
     det.set_xticks(ticks, [f"{100 * p:g}" for p in DET_TICKS])
@@ -232,6 +234,7 @@ def _draw(roc: Axes, det: Axes, curve: dict[str, Any], colour: str, label: str |
     false_alarm = np.array([point["false_alarm_probability"] for point in points])
     found = np.array([point["detection_probability"] for point in points])
     low, high = np.array([point["detection_ci95"] for point in points]).T
+    label = None if label is None else plain(label)
     roc.plot(false_alarm, found, color=colour, linewidth=1.4 if label else 0.8, label=label, zorder=order)
     edge = 1e-4
     x, missed = stats.norm.ppf(false_alarm), stats.norm.ppf(np.clip(1.0 - found, edge, 1.0 - edge))

@@ -20,6 +20,11 @@ def number(value: float | None, form: str = ".1f") -> str:
     return "–" if value is None else format(value, form)
 
 
+def plain(name: str) -> str:
+    """A name as a label of a figure, where dollar signs would be mathematics."""
+    return name.replace("$", r"\$")
+
+
 def attackers_table(report: dict[str, Any]) -> Table:
     """An ``"attackers"`` report for the terminal."""
     detector = report["detector"]
@@ -31,7 +36,7 @@ def attackers_table(report: dict[str, Any]) -> Table:
         "had an alarm; at alarm: mean error then; exact: without simulation",
         box=None, padding=(0, 2, 0, 0),
     )
-    table.add_column("attacker", max_width=14, overflow="fold")
+    table.add_column("attacker", overflow="fold")
     table.add_column("knows", no_wrap=True)
     for title in ("error\nm", "exact\nm", "detected\n", "median\ns", "at alarm\nm", "of\noptimum"):
         table.add_column(title, justify="right", no_wrap=True)
@@ -120,10 +125,11 @@ def attackers_figure(report: dict[str, Any], path: Path) -> None:
     if bound is not None:
         axes.axvline(bound, color=BOUND, linestyle="--", linewidth=1.2)
         axes.text(bound, len(played) - 0.4, "upper bound ", color=BOUND, ha="right", va="bottom", fontsize=9)
-    labels = [f"{row['attacker']}\n({row['knowledge']})" for row in reversed(played)]
+    labels = [f"{plain(row['attacker'])}\n({row['knowledge']})" for row in reversed(played)]
     axes.set_yticks(range(len(played)), labels, fontsize=9)
     axes.set_xlabel("mean undetected horizontal error, m (95 % interval)")
-    axes.set_title(f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}", pad=16)
+    title = f"{report['scenario']}, {report['fidelity']}, against {report['detector']['name']}"
+    axes.set_title(plain(title), pad=16)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     files.write_figure(path, figure)

@@ -196,7 +196,7 @@ def wrong_shadow_table(report: dict[str, Any]) -> Table:
         box=None,
         padding=(0, 2, 0, 0),
     )
-    table.add_column("attacker\n", max_width=16, overflow="fold")
+    table.add_column("attacker\n", overflow="fold")
     table.add_column("shadow\n", no_wrap=True)
     for title in ("error\nm", "exact\nm", "detected\n", "of\nright"):
         table.add_column(title, justify="right", no_wrap=True)

@@ -80,6 +80,117 @@ def test_damaged_config(folder, content):
         LearnedSpoofer.load(folder)
 
 
+BYTES = {
+    "truncated": lambda content: content[: len(content) // 2],
+    "one byte less": lambda content: content[:-1],
+    "flipped": lambda content: content[:200] + bytes(byte ^ 0xFF for byte in content[200:240]) + content[240:],
+    "empty": lambda content: b"",
+    "text": lambda content: b"this is no policy\n",
+    "zeros": lambda content: bytes(len(content)),
+    "list": lambda content: b"[1, 2]",
+    "deep": lambda content: b"[" * 100_000,
+    "not UTF-8": lambda content: b'{"environment": "\xff"}',
+}
+
+
+@pytest.mark.parametrize("damage", BYTES)
+@pytest.mark.parametrize("name", [CONFIG_FILE, POLICY_FILE])
+def test_a_damaged_file_is_named(folder, name, damage):
+    (folder / CONFIG_FILE).write_text(json.dumps({"environment": {"knowledge": "shadow"}, "seed": list(range(200))}))
+    whole = (folder / name).read_bytes()
+    (folder / name).write_bytes(BYTES[damage](whole))
+    if (name, damage) == (CONFIG_FILE, "one byte less"):
+        (folder / name).write_bytes(whole[:-1].rstrip(b"}"))
+    with pytest.raises(ValueError, match="is damaged: ") as raised:
+        LearnedSpoofer.load(folder)
+    assert str(raised.value).startswith(str(folder / name))
+    assert "\n" not in str(raised.value)
+
+
+def without(name):
+    return lambda arrays: {key: value for key, value in arrays.items() if key != name}
+
+
+ARRAYS = {
+    "no layout": without("layout"),
+    "no weights": without("weight_1"),
+    "no bias": without("bias_2"),
+    "nothing": lambda arrays: {},
+    "other keys": lambda arrays: {f"x{key}": value for key, value in arrays.items()},
+    "one key more": lambda arrays: {**arrays, "extra": np.zeros(1)},
+    "a layer that is not the next": lambda arrays: {**arrays, "weight_9": np.ones((3, 3)), "bias_9": np.ones(3)},
+    "NaN": lambda arrays: {**arrays, "weight_0": np.full_like(arrays["weight_0"], np.nan)},
+    "infinity": lambda arrays: {**arrays, "bias_0": np.full_like(arrays["bias_0"], np.inf)},
+    "whole numbers": lambda arrays: {**arrays, "weight_0": arrays["weight_0"].astype(np.int64)},
+    "complex": lambda arrays: {**arrays, "weight_0": arrays["weight_0"].astype(np.complex64)},
+    "text": lambda arrays: {**arrays, "weight_0": arrays["weight_0"].astype(str)},
+    "numbers as names": lambda arrays: {**arrays, "layout": np.arange(20)},
+    "one name": lambda arrays: {**arrays, "layout": np.array("x")},
+    "a name less": lambda arrays: {**arrays, "layout": arrays["layout"][1:]},
+    "turned": lambda arrays: {**arrays, "weight_0": arrays["weight_0"].T},
+    "flat": lambda arrays: {**arrays, "weight_0": arrays["weight_0"].ravel()},
+    "a bias that is a matrix": lambda arrays: {**arrays, "bias_0": arrays["bias_0"][:, None]},
+    "two outputs": lambda arrays: {**arrays, "weight_2": arrays["weight_2"][:2], "bias_2": arrays["bias_2"][:2]},
+    "no outputs": lambda arrays: {**arrays, "weight_2": arrays["weight_2"][:0], "bias_2": arrays["bias_2"][:0]},
+}
+
+
+@pytest.mark.parametrize("damage", ARRAYS)
+def test_a_policy_of_another_form_is_named(folder, damage):
+    with np.load(folder / POLICY_FILE) as arrays:
+        changed = ARRAYS[damage](dict(arrays))
+    np.savez(folder / POLICY_FILE, **changed)
+    with pytest.raises(ValueError, match=r"policy\.npz is damaged: ") as raised:
+        LearnedSpoofer.load(folder)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        None,
+        [],
+        "liu-flight",
+        {"scenario": 5},
+        {"scenario": ["liu-flight"]},
+        {"detector": 3},
+        {"detector": []},
+        {"detector": [None]},
+        {"shadow": {}},
+        {"fidelity": 1},
+        {"knowledge": 1},
+        {"knowledge": "all"},
+        {"frames": "two"},
+        {"forfeit": "x"},
+        {"threads": None},
+        {"tracking_sigma": []},
+        {"coupling": 7},
+    ],
+)
+def test_an_environment_of_other_types_is_named(folder, environment):
+    (folder / CONFIG_FILE).write_text(json.dumps({"environment": environment}))
+    with pytest.raises(ValueError, match=r"config\.json is damaged: "):
+        LearnedSpoofer.load(folder)
+
+
+def test_a_config_of_any_size_is_not_read(folder):
+    (folder / CONFIG_FILE).write_text(json.dumps({"environment": {}, "more": "x" * 2**20}))
+    with pytest.raises(ValueError, match=r"config\.json is damaged: it has more than 1048576 bytes"):
+        LearnedSpoofer.load(folder)
+
+
+def test_a_save_that_fails_leaves_the_policy_that_was_there(policy, folder, monkeypatch):
+    def failing(*_):
+        raise OSError(28, "No space left on device")
+
+    before = (folder / POLICY_FILE).read_bytes()
+    monkeypatch.setattr("spoofgym.files.os.fsync", failing)
+    with pytest.raises(OSError, match="No space left"):
+        policy.save(folder)
+    assert (folder / POLICY_FILE).read_bytes() == before
+    assert sorted(path.name for path in folder.iterdir()) == [CONFIG_FILE, POLICY_FILE]
+
+
 # --- the defender -----------------------------------------------------------------------------------------------------
 
 DEPTHS = 5
@@ -144,3 +255,18 @@ def test_a_saved_defender_comes_back(defender, tmp_path):
 def test_a_spoofers_run_folder_is_no_defenders(folder):
     with pytest.raises(ValueError, match="is the run folder of a spoofer, not of a defender"):
         LearnedDefender.load(folder)
+
+
+def test_a_defenders_run_folder_is_no_spoofers(defender, tmp_path):
+    defender.save(tmp_path)
+    (tmp_path / CONFIG_FILE).write_text(json.dumps({"environment": {"attacks": "training", "detectors": ["snapshot"]}}))
+    with pytest.raises(ValueError, match="is the run folder of a defender, not of a spoofer"):
+        LearnedSpoofer.load(tmp_path)
+
+
+def test_a_defender_without_a_depth_is_refused(defender, tmp_path):
+    short = (*defender.weights[:-1], defender.weights[-1][:2]), (*defender.biases[:-1], defender.biases[-1][:2])
+    LearnedDefender("d", defender.config, defender.layout, *short).save(tmp_path)
+    (tmp_path / CONFIG_FILE).write_text(json.dumps({"environment": {"attacks": "training"}}))
+    with pytest.raises(ValueError, match=r"policy\.npz is damaged: a defender's network has more outputs than 2"):
+        LearnedDefender.load(tmp_path)

@@ -1,0 +1,61 @@
+"""Arguments of programs: what is valid is told in one line, and a destination is checked at once."""
+
+import pytest
+
+from spoofgym import command_line
+from spoofgym.command_line import Parser, add_figure, add_json
+
+
+@pytest.fixture
+def parser():
+    result = Parser(prog="x")
+    add_json(result)
+    add_figure(result)
+    for name in ("count", "seed_number", "threads", "above_one", "run_folder"):
+        result.add_argument(f"--{name}", type=getattr(command_line, name))
+    return result
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--count", "0", "expected a whole number of 1 or more, got '0'"),
+        ("--count", "1.5", "expected a whole number of 1 or more, got '1.5'"),
+        ("--count", "nan", "expected a whole number of 1 or more, got 'nan'"),
+        ("--count", "inf", "expected a whole number of 1 or more, got 'inf'"),
+        ("--count", "many", "expected a whole number, got 'many'"),
+        ("--seed_number", "-1", "a seed is 0 or more, got '-1'"),
+        ("--seed_number", "1.5", "expected a whole number, got '1.5'"),
+        ("--threads", "1e9", "expected 1024 threads or fewer, got '1e9'"),
+        ("--above_one", "inf", "expected a finite number greater than 1, got 'inf'"),
+        ("--above_one", "1", "expected a finite number greater than 1, got '1'"),
+        ("--figure", "out.gif", "a figure's name ends in .png, .svg, .pdf, got 'out.gif'"),
+        ("--figure", "folder.png", "folder.png is a folder, a file is meant"),
+        ("--json", "folder.png", "folder.png is a folder, a file is meant"),
+        ("--json", "file/out.json", "file/out.json cannot be written: Not a directory"),
+        ("--json", "out/", "expected the name of a file, got 'out/'"),
+        ("--json", "a\nb/", "expected the name of a file"),
+        ("--json", "", "expected the name of a file, got ''"),
+        ("--run_folder", "file", "file is a file, a folder is meant"),
+        ("--colour", "red", "unrecognized arguments: --colour red"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line(parser, option, value, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SystemExit) as ended:
+        parser.parse_args([option, value])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ")
+    assert words in line
+
+
+def test_what_is_right_is_understood(parser, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = ["--count", "1e6", "--threads", "2", "--json", "-", "--figure", "a/b.PNG", "--run_folder", "x[/y]"]
+    options = parser.parse_args(given)
+    assert (options.count, options.threads, options.json) == (1_000_000, 2, "-")
+    assert (str(options.figure), str(options.run_folder)) == ("a/b.PNG", "x[/y]")
+    assert list(tmp_path.iterdir()) == []
