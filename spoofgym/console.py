@@ -5,12 +5,17 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
+from rich.measure import Measurement
 from rich.status import Status
+from rich.table import Table
 from rich.text import Text
 
 UNLIMITED = 10_000
 """Columns of an output that is no terminal: nothing is wrapped or cut, unless ``COLUMNS`` says how wide it is."""
+
+NARROW_NAME = 14
+"""Columns to which the names of a table are folded where the table is too wide for the terminal."""
 
 
 class PlainConsole(Console):
@@ -35,3 +40,32 @@ def console(stderr: bool = False) -> Console:
     if not result.is_terminal and not os.environ.get("COLUMNS", "").isdigit():
         result.width = UNLIMITED
     return result
+
+
+def show(terminal: Console, what: RenderableType) -> None:
+    """Print a table, a text or a group of them, and leave nothing out.
+
+    A table that is too wide for the terminal has the names in its first column folded. If it is still too wide, its
+    lines go on in the next line of the terminal: a figure is never cut.
+    """
+    for part in what.renderables if isinstance(what, Group) else [what]:
+        if isinstance(part, Table):
+            _show_table(terminal, part)
+        else:
+            terminal.print(part)
+
+
+def _show_table(terminal: Console, table: Table) -> None:
+    given = terminal.width
+    if _natural_width(terminal, table) > given:
+        table.columns[0].max_width, table.columns[0].no_wrap = NARROW_NAME, False
+        table.columns[0].overflow = "fold"
+    terminal.width = max(given, _natural_width(terminal, table))
+    try:
+        terminal.print(table)
+    finally:
+        terminal.width = given
+
+
+def _natural_width(terminal: Console, table: Table) -> int:
+    return Measurement.get(terminal, terminal.options.update(max_width=UNLIMITED), table).maximum

@@ -26,7 +26,7 @@ from agents.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
-from spoofgym.console import console
+from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.recorded import evaluate_recorded
@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _show(report: dict[str, Any], options: argparse.Namespace, terminal: Console) -> None:
     """The table, then JSON and figures where they are asked for; where one of them fails, the others are given."""
     steps: list[Callable[[], object]] = [
-        lambda: terminal.print(TABLES[report["kind"]](report)),
+        lambda: show(terminal, TABLES[report["kind"]](report)),
         lambda: give_json(report, options.json),
     ]
     if options.figure is not None:

@@ -17,7 +17,7 @@ from rich.table import Table
 
 from agents.defenders import grid
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
-from spoofgym.console import console
+from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.defence import play_response
 from spoofgym.evaluation.defence_metrics import defender_score
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows.sort(key=lambda row: float(row["mean_error_m"]))
     report = {"schema_version": 1, "kind": "tuning", "scenario": scenario.name, "rows": rows}
     table = tuning_table(report, options.episodes)
-    do_all(lambda: terminal.print(table), lambda: give_json(report, options.json))
+    do_all(lambda: show(terminal, table), lambda: give_json(report, options.json))
     return 0
 
 

@@ -28,7 +28,7 @@ from agents.scripted import OffsetSequence
 from spoofgym.arrays import Floats
 from spoofgym.calibration import calibrated
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
-from spoofgym.console import console
+from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot
@@ -243,7 +243,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
     report = _report(options, terminal)
-    do_all(lambda: terminal.print(wrong_shadow_table(report)), lambda: give_json(report, options.json))
+    do_all(lambda: show(terminal, wrong_shadow_table(report)), lambda: give_json(report, options.json))
     if options.json not in (None, STDOUT):
         terminal.print(f"rows in {options.json}", soft_wrap=True)
     return 0

@@ -197,7 +197,7 @@ def test_interruption_leaves_a_usable_policy(tmp_path):
     command = [sys.executable, "-m", "train.defender", *SHORT, "--steps", "100000000", "--out", str(folder)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 600
-    while not list(folder.rglob("events.*")) and process.poll() is None and time.monotonic() < deadline:
+    while not (folder / CHECKPOINT_FILE).exists() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.2)
     time.sleep(2.0)
     process.send_signal(signal.SIGINT)
