@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Protocol
 
 from spoofgym import files
@@ -47,18 +48,36 @@ def program(main: Callable[[Sequence[str] | None], int | None]) -> Program:
         except BrokenPipeError:
             _leave_stdout()
             return CLOSED_PIPE
-        except (ValueError, ArithmeticError, FileNotFoundError) as error:
+        except (ValueError, FileNotFoundError) as error:
             say(f"error: {_words(error)}")
             return USAGE
         except OSError as error:
             _leave_stdout()
             say(f"error: {_words(error)}")
             return FAILURE
-        except (RuntimeError, ImportError, MemoryError) as error:
+        except (ArithmeticError, RuntimeError, ImportError, MemoryError) as error:
             say(f"error: {_words(error)}")
             return FAILURE
 
     return entry
+
+
+def quiet_start() -> None:
+    """Let Ctrl-C end a program in one line while it is still importing, too.
+
+    For packages of programs: nothing happens but where Python is looking for the module of ``python -m``, which it
+    shows by its first argument.
+    """
+    if sys.argv[:1] == ["-m"]:
+        sys.excepthook = _end_of_start
+
+
+def _end_of_start(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+        return
+    say("interrupted")
+    os._exit(INTERRUPTED)  # the interpreter would kill itself by the signal and give another status
 
 
 def say(text: str) -> None:
