@@ -1,7 +1,7 @@
 """What every program does alike: how it ends, and how it says why.
 
-A mistake of the user or a failure is told in one line on stderr. The exit status is 0, 2 where the arguments are wrong,
-1 where the work failed, and 130 after Ctrl-C. The library itself never calls this.
+A mistake of the user or a failure is told in one line on stderr. The exit status is 0, 2 where the arguments are wrong
+or ask for a filter that diverges, 1 where the work failed, and 130 after Ctrl-C. The library itself never calls this.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ def program(main: Callable[[Sequence[str] | None], int | None]) -> Program:
         except BrokenPipeError:
             _leave_stdout()
             return CLOSED_PIPE
-        except (ValueError, FileNotFoundError) as error:
+        except (ValueError, ArithmeticError, FileNotFoundError) as error:
             say(f"error: {_words(error)}")
             return USAGE
         except OSError as error:
             _leave_stdout()
             say(f"error: {_words(error)}")
             return FAILURE
-        except (ArithmeticError, RuntimeError, ImportError, MemoryError) as error:
+        except (RuntimeError, ImportError, MemoryError) as error:
             say(f"error: {_words(error)}")
             return FAILURE
 

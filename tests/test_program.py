@@ -24,7 +24,7 @@ def ending(error):
     ("error", "status", "line"),
     [
         (ValueError("detector 'x': no\nsuch thing"), 2, "error: detector 'x': no such thing"),
-        (FloatingPointError("diverged"), 1, "error: diverged"),
+        (FloatingPointError("diverged"), 2, "error: diverged"),
         (FileNotFoundError("runs/x is no run folder"), 2, "error: runs/x is no run folder"),
         (OSError(28, "No space left on device", "out.json"), 1, "error: out.json: No space left on device"),
         (OSError(28, "No space left on device"), 1, "error: No space left on device"),
