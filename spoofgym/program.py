@@ -1,7 +1,7 @@
 """What every program does alike: how it ends, and how it says why.
 
-A mistake of the user or a failure is told in one line on stderr. The exit status is 0, 2 where the arguments are wrong,
-1 where the work failed, and 130 after Ctrl-C. The library itself never calls this.
+A mistake of the user or a failure is told in one line on stderr. The exit status is 0, 2 where the arguments are wrong
+or ask for a filter that diverges, 1 where the work failed, and 130 after Ctrl-C. The library itself never calls this.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Protocol
 
 from spoofgym import files
@@ -59,6 +60,24 @@ def program(main: Callable[[Sequence[str] | None], int | None]) -> Program:
             return FAILURE
 
     return entry
+
+
+def quiet_start() -> None:
+    """Let Ctrl-C end a program in one line while it is still importing, too.
+
+    For packages of programs: nothing happens but where Python is looking for the module of ``python -m``, which it
+    shows by its first argument.
+    """
+    if sys.argv[:1] == ["-m"]:
+        sys.excepthook = _end_of_start
+
+
+def _end_of_start(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
+        return
+    say("interrupted")
+    os._exit(INTERRUPTED)  # the interpreter would kill itself by the signal and give another status
 
 
 def say(text: str) -> None:

@@ -130,3 +130,31 @@ def test_ctrl_c_is_one_line():
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (130, "interrupted\n")
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), ValueError("a fault")])
+def test_ctrl_c_while_a_program_is_imported_is_one_line(tmp_path, error):
+    """A package of programs whose module is interrupted at its import; another exception keeps its traceback."""
+    package = tmp_path / "programs"
+    package.mkdir()
+    (package / "__init__.py").write_text("from spoofgym.program import quiet_start\nquiet_start()\n")
+    (package / "one.py").write_text(f"raise {error!r}\n")
+    path = os.pathsep.join([str(tmp_path), os.getcwd(), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-m", "programs.one"],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    if isinstance(error, KeyboardInterrupt):
+        assert (done.returncode, done.stderr) == (130, "interrupted\n")
+    else:
+        assert done.returncode == 1
+        assert done.stderr.startswith("Traceback")
+
+
+def test_a_library_that_is_imported_changes_nothing():
+    code = "import sys, spoofgym.evaluation; sys.exit(sys.excepthook is not sys.__excepthook__)"
+    assert run(code).returncode == 0

@@ -28,7 +28,7 @@ from spoofgym.envs.defender_game import EXCLUDE
 from spoofgym.envs.range_features import SLOT_FIELD
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
-from train import settings as limits
+from train import limits
 from train.imitation import imitate
 from train.ppo import LAST_RATE, arrays
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 
 from agents.baselines import exact_threshold
 from agents.defenders import parse
@@ -47,7 +47,7 @@ DEFENDER_EPISODES = 4_000
 MATRIX_EPISODES = {"linear": 4_000, "strapdown": 500}
 MATRIX_ARL0 = 1e4
 ROC_ATTACK = "ramp:0.1"
-TABLES = {
+TABLES: dict[str, Callable[[dict[str, Any]], RenderableType]] = {
     "attackers": attackers_table,
     "recorded": recorded_table,
     "defenders": defenders_tables,

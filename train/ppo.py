@@ -21,7 +21,7 @@ from agents.learned import LearnedSpoofer
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import SpooferVectorEnv
-from train import settings as limits
+from train import limits
 from train.expected_alarm import ExpectedAlarmVectorEnv, alarm_probability_is_known
 
 LAST_RATE = 0.02

@@ -147,7 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
     parser.add_argument("--window", type=count, default=50, help="w, fixes (default: %(default)s)")
     parser.add_argument("--rate", type=float, default=3.0, help="of the ramp, m/s per axis (default: %(default)s)")
-    parser.add_argument("--guards", nargs="+", default=list(GUARDS), help="default: %(default)s")
+    parser.add_argument("--guards", nargs="+", choices=GUARDS, metavar="GUARD", default=list(GUARDS),
+                        help=f"of the adaptation: {', '.join(GUARDS)} (default: every one)")
     options = parser.parse_args(arguments)
     for noise in NOISES:
         print(f"noise {noise}, w = {options.window}, {options.rate:g} m/s, {options.runs} runs\n")

@@ -57,4 +57,4 @@ def test_the_command_prints_a_row_per_response_and_draws(capsys, tmp_path):
 def test_no_runs_are_refused(capsys):
     with pytest.raises(SystemExit):
         main(["--runs", "0"])
-    assert "num_runs must be 1 or more" in capsys.readouterr().err
+    assert "expected a whole number, 1 or more, got '0'" in capsys.readouterr().err

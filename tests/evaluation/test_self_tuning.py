@@ -41,7 +41,7 @@ def test_error_and_detection_of_the_common_filter_are_those_of_its_covariance():
 def test_wrong_arguments_end_the_program(capsys):
     with pytest.raises(SystemExit):
         self_tuning.main(["--runs", "0"])
-    assert "runs must be a whole number, 1 or more" in capsys.readouterr().err
+    assert "expected a whole number, 1 or more" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         self_tuning.main(["--runs", "2", "--guards", "some"])
-    assert "guard must be one of" in capsys.readouterr().err
+    assert "invalid choice: 'some'" in capsys.readouterr().err

@@ -36,7 +36,7 @@ def test_it_is_evaluated_in_a_game_with_its_memory(run, capsys):
 
 
 def test_it_can_be_resumed(run):
-    assert spoofer.main(["--steps", "12000", "--out", str(run), "--resume"]) == 0
+    assert spoofer.main(["--steps", "20000", "--out", str(run), "--resume"]) == 0
     assert LearnedSpoofer.load(run).config.frames == 3
 
 
