@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -147,7 +148,7 @@ def test_a_write_that_fails_leaves_nothing(place, monkeypatch):
     def full(*_):
         raise OSError("no space left")
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(os, "replace", full)
     calibration_cache.store(NAME, SETTING, "")
     assert list(place.iterdir()) == []
 
@@ -156,7 +157,7 @@ def test_an_interrupted_write_leaves_nothing(place, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Path, "replace", interrupted)
+    monkeypatch.setattr(os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
         calibration_cache.store(NAME, SETTING, "")
     assert list(place.iterdir()) == []
