@@ -96,6 +96,10 @@ class _Search:
         except ValueError as error:
             raise ValueError(f"detector {self.detector.name!r}: {error}") from error
         threshold = counted.threshold(self._arl0)
+        if math.isinf(threshold):
+            raise ValueError(
+                f"detector {self.detector.name!r}: the statistic is infinite in clean runs more often than arl0 allows"
+            )
         alarms, at_risk = counted.at(threshold)
         if alarms >= self._first_alarms:
             self.result = _calibration(threshold, alarms, at_risk)

@@ -12,8 +12,6 @@ import dataclasses
 import hashlib
 import json
 import math
-import os
-import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +24,7 @@ import spoofgym
 from spoofgym.cache_folder import folder
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.files import write_json
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
@@ -109,15 +108,7 @@ def store(name: str, setting: Setting, remark: str) -> None:
     checksum = _checksum(name, remark, setting)
     content = {"what": remark, "setting": dataclasses.asdict(setting), "checksum": checksum}
     with suppress(OSError):
-        place.mkdir(parents=True, exist_ok=True)
-        handle, draft = tempfile.mkstemp(suffix=".draft", dir=place)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(json.dumps(content, indent=2) + "\n")
-            Path(draft).replace(place / f"{name}.json")
-        except BaseException:
-            Path(draft).unlink(missing_ok=True)
-            raise
+        write_json(place / f"{name}.json", content)
 
 
 def spelled_out(detector: Detector) -> bool:

@@ -207,3 +207,16 @@ def test_too_few_alarms_are_refused():
 def test_no_arl0_is_measured_at_a_threshold_that_decides_nothing(threshold):
     with pytest.raises(ValueError, match=r"threshold must be .* greater than 0"):
         measure_arl0(Snapshot(), WHITE, threshold, min_epochs=1)
+
+
+@pytest.mark.parametrize("value", [np.inf, np.nan])
+def test_a_statistic_that_no_threshold_can_hold_is_refused_by_name(value):
+    """Runs are not drawn without end in search of first alarms."""
+
+    def clean(detector, runs, rng):
+        statistics = rng.random((runs, 20))
+        statistics[rng.random(statistics.shape) < 0.1] = value
+        return np.empty((runs, 0)), statistics
+
+    with pytest.raises(ValueError, match=r"detector 'snapshot:threshold=9': .* (infinite in|not a number)"):
+        calibrate(Snapshot(9.0), clean, 100.0)
