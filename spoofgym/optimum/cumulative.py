@@ -34,7 +34,7 @@ def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> flo
     Raises:
         ValueError: a value out of range, or a threshold so low that the test alarms more often without any bias.
     """
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     degrees = validation.whole("cumulative test", "degrees", degrees, 1)
     missed = validation.probability("cumulative test", "missed", missed)
 

@@ -25,13 +25,13 @@ LARGEST_THRESHOLD = 1e6
 """With a larger one the mixture has too many terms."""
 
 
-def check_threshold(threshold: float) -> None:
-    """Refuse a threshold that no snapshot test can have.
+def check_threshold(threshold: float) -> float:
+    """The threshold, if a snapshot test can have it.
 
     Raises:
         ValueError: the threshold is not a positive number of at most `LARGEST_THRESHOLD`.
     """
-    validation.above("snapshot test", "threshold", threshold, largest=LARGEST_THRESHOLD)
+    return validation.above("snapshot test", "threshold", threshold, largest=LARGEST_THRESHOLD)
 
 
 def log_survival(magnitude: Floats, dimension: int, threshold: float) -> Floats:

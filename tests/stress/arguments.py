@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from spoofgym import optimum
 from spoofgym.attacks import ATTACKS, make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors import DETECTORS, make_detector
@@ -38,6 +39,8 @@ from spoofgym.streams import RunStreams
 LOOSE, TIGHT, LONG = "liu-flight:horizon=12", "kujur-flight:horizon=12,onset=60", "foi-drive:horizon=30"
 UNMATCHED = "foi-drive:receiver=foi,onset=60,horizon=12"
 LONG_TIGHT = "kujur-flight:horizon=60,onset=60"
+QUICK: dict[str, dict[str, Any]] = {"kujur-flight": {"horizon": 12, "onset": 60.0}, "liu-flight": {"horizon": 12}}
+"""Options that make a scenario short, where it has them."""
 STEPS = 4
 REFUSED = (ValueError, TypeError)
 
@@ -172,14 +175,15 @@ def _parts(rng: np.random.Generator) -> Try:
     chosen = rng.choice(len(parameters), size=min(len(parameters), 1 + int(rng.random() < 0.2)), replace=False)
     keys = [parameters[int(place)].name for place in chosen]
     played = play if _fits(kind, name) else _nothing
+    quick = QUICK.get(name, {}) if kind == "scenario" else {}
     if rng.random() < 0.5:
-        options = {p.name: _example(p) for p in parameters if p.default is p.empty}
+        options = {p.name: _example(p) for p in parameters if p.default is p.empty} | quick
         options |= {key: hostile_text(rng) for key in keys}
         text = f"{name}:" + ",".join(f"{key}={value}" for key, value in options.items())
         named = (*keys, "specification", "member")
         owners = (name, "specification", *_inner(name))
         return Try(f"{kind} {text[:150]!r}", owners, named, lambda: MAKERS[kind](text), played)
-    given = {p.name: _example(p) for p in parameters if p.default is p.empty}
+    given = {p.name: _example(p) for p in parameters if p.default is p.empty} | quick
     given |= {key: hostile(rng) for key in keys}
     words = f"{kind} {name}({', '.join(f'{key}={_shown(value)}' for key, value in given.items())})"
     return Try(words, (name, *_inner(name)), tuple(keys), lambda: factory(**given), played)
@@ -377,8 +381,37 @@ def _others(rng: np.random.Generator) -> Try:
     return Try(words, (*owners, "slices of runs"), (key,), lambda: function(**{key: value}), play)
 
 
+OF_MODELS = tuple(
+    (function, tuple(key for key in inspect.signature(function).parameters if key not in ("model", "tests", "offsets")))
+    for function in (
+        optimum.best_budget, optimum.best_ramp, optimum.bounded_optimum, optimum.cumulative_optimum,
+        optimum.dynamic_programme, optimum.noncentrality_optimum, optimum.upper_bound, optimum.ewma,
+        optimum.window_mean, optimum.missed_magnitude, optimum.expected_play, optimum.zero_alarm,
+    )
+)  # fmt: skip
+GOOD = {"threshold": 25.9, "num_epochs": 3, "budget": 1.0, "drag_off_rate": 1.0, "n": 3, "limit": 3.0, "degrees": 9}
+
+
+def _optima(rng: np.random.Generator) -> Try:
+    """Numbers of the optimum's functions, on a model of a few epochs."""
+    function, keys = OF_MODELS[int(rng.integers(len(OF_MODELS)))]
+    key, value = str(rng.choice(keys)), hostile(rng)
+    parameters = inspect.signature(function).parameters
+    given = {name: GOOD.get(name, 0.5) for name, p in parameters.items() if p.default is p.empty}
+    model = make_scenario(LOOSE).linear_model()
+    for name, thing in (("model", model), ("offsets", np.zeros((12, 3))), ("tests", optimum.gate(3.0))):
+        if name in parameters:
+            given[name] = thing
+    given[key] = value
+    words = f"optimum.{function.__name__}({key}={_shown(value)})"
+    return Try(words, (*OF_OPTIMA, function.__name__), (key,), lambda: function(**given), _nothing)
+
+
+OF_OPTIMA = ("snapshot test", "cumulative test", "optimum", "linear test", "must")
+
+
 GENERATORS: tuple[Callable[[np.random.Generator], Try], ...] = (
-    _parts, _parts, _parts, _environments, _environments, _resets, _actions, _others,
+    _parts, _parts, _parts, _environments, _environments, _resets, _actions, _others, _optima,
 )  # fmt: skip
 
 
