@@ -148,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--guards", nargs="+", default=list(GUARDS), help="default: %(default)s")
     options = parser.parse_args(arguments)
     try:
-        validation.whole("self_tuning", "runs", options.runs, 1)
+        validation.runs("self_tuning", "runs", options.runs)
         for noise in NOISES:
             print(f"noise {noise}, w = {options.window}, {options.rate:g} m/s, {options.runs} runs\n")
             print(

@@ -20,6 +20,8 @@ from spoofgym.optimum.closed_form import ClosedForm, noncentrality_optimum
 from spoofgym.optimum.response import check_epochs
 from spoofgym.optimum.survival import check_threshold, log_survival
 
+MOST_DEGREES = 1_000_000
+
 
 def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> float:
     """λ, the magnitude of a bias of all innovations in a window that a chi-square test misses with probability P_MD.
@@ -35,7 +37,7 @@ def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> flo
         ValueError: a value out of range, or a threshold so low that the test alarms more often without any bias.
     """
     threshold = check_threshold(threshold)
-    degrees = validation.whole("cumulative test", "degrees", degrees, 1)
+    degrees = validation.whole("cumulative test", "degrees", degrees, 1, MOST_DEGREES)
     missed = validation.probability("cumulative test", "missed", missed)
 
     def excess(magnitude: float) -> float:
