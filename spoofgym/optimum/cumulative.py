@@ -18,7 +18,7 @@ from spoofgym import validation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.closed_form import ClosedForm, noncentrality_optimum
 from spoofgym.optimum.response import check_epochs
-from spoofgym.optimum.survival import check_threshold, log_survival
+from spoofgym.optimum.survival import log_survival
 
 MOST_DEGREES = 1_000_000
 
@@ -36,7 +36,7 @@ def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> flo
     Raises:
         ValueError: a value out of range, or a threshold so low that the test alarms more often without any bias.
     """
-    threshold = check_threshold(threshold)
+    threshold = validation.above("cumulative test", "threshold", threshold, largest=MOST_DEGREES)
     degrees = validation.whole("cumulative test", "degrees", degrees, 1, MOST_DEGREES)
     missed = validation.probability("cumulative test", "missed", missed)
 

@@ -77,6 +77,10 @@ def best_ramp(
     return BestRamp(float(rate[best]), float(direction), outcome)
 
 
+RATES = (1e-6, 1e6)
+"""Least and largest limit of a rate, m/s."""
+
+
 def axis_limits(drag_off_rate: Floats | float | None) -> Floats:
     """The largest rate of the offset per axis, (3,), m/s ENU; infinite where there is no limit.
 
@@ -88,7 +92,7 @@ def axis_limits(drag_off_rate: Floats | float | None) -> Floats:
         given = validation.shown(drag_off_rate)
         raise ValueError(f"drag_off_rate must be one positive number or three (east, north, up), got {given}")
     for limit in limits[np.isfinite(limits)].tolist():
-        validation.above("optimum", "drag_off_rate", limit)
+        validation.between("optimum", "drag_off_rate", limit, *RATES)
     return np.broadcast_to(np.asarray(limits, dtype=np.float64), (3,))
 
 

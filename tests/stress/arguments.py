@@ -10,7 +10,7 @@ import inspect
 import re
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from decimal import Decimal
 from functools import cache
 from typing import Any
@@ -27,14 +27,24 @@ from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
+from spoofgym.navigation.adaptation import Adaptation
+from spoofgym.navigation.credible import AuxiliaryRule
+from spoofgym.navigation.credible_filter import CredibleTuning
 from spoofgym.navigation.facts import RANGES
+from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.parallel import RunSlices
 from spoofgym.responses import RESPONSES, make_response
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import SCENARIOS, make_scenario
+from spoofgym.sensors.confounders import Disturbances
+from spoofgym.sensors.imu import grade
+from spoofgym.sensors.odometer import Odometer
+from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.trajectory import Accelerate, Climb, Straight, Turn
 
 LOOSE, TIGHT, LONG = "liu-flight:horizon=12", "kujur-flight:horizon=12,onset=60", "foi-drive:horizon=30"
 UNMATCHED = "foi-drive:receiver=foi,onset=60,horizon=12"
@@ -381,6 +391,35 @@ def _others(rng: np.random.Generator) -> Try:
     return Try(words, (*owners, "slices of runs"), (key,), lambda: function(**{key: value}), play)
 
 
+CREDIBLE = {"step": 0.1, "samples": 5, "acceleration": 0.5, "auxiliary_sigma": 0.5, "fix_sigma": 0.6, "height_sigma": 1}
+SETTINGS: tuple[tuple[Callable[..., Any], dict[str, Any]], ...] = (
+    (Receiver, {}), (FilterTuning, {}), (Disturbances, {}), (Adaptation, {}), (AuxiliaryRule, {}), (Demands, {}),
+    (Odometer, {}), (CredibleTuning, CREDIBLE), (Straight, {"duration": 1.0}), (Turn, {"angle": 1.0, "duration": 1.0}),
+    (Climb, {"height_change": 1.0, "duration": 1.0}), (Accelerate, {"speed_change": 1.0, "duration": 1.0}),
+    (grade, {"name": "fog"}), (replace, {"obj": grade("fog")}),
+)  # fmt: skip
+
+
+def _settings(rng: np.random.Generator) -> Try:
+    """Frozen settings of sensors, filters and trajectories."""
+    make, given = SETTINGS[int(rng.integers(len(SETTINGS)))]
+    if make is replace:
+        keys = [item.name for item in fields(given["obj"]) if item.name != "name"]
+    else:
+        keys = list(inspect.signature(make).parameters)
+    key, value = str(rng.choice(keys)), hostile(rng)
+    if rng.random() < 0.3:
+        value = (value,) * int(rng.choice([2, 3, 6]))
+    words = f"{make.__name__}({key}={_shown(value)})"
+    arguments = {**given, key: value}
+    return Try(words, ("must", "needs", "unknown"), (key, "grade"), lambda: _make(make, arguments), _nothing)
+
+
+def _make(make: Callable[..., Any], given: dict[str, Any]) -> Any:
+    given = dict(given)
+    return replace(given.pop("obj"), **given) if make is replace else make(**given)
+
+
 OF_MODELS = tuple(
     (function, tuple(key for key in inspect.signature(function).parameters if key not in ("model", "tests", "offsets")))
     for function in (
@@ -404,7 +443,15 @@ def _optima(rng: np.random.Generator) -> Try:
             given[name] = thing
     given[key] = value
     words = f"optimum.{function.__name__}({key}={_shown(value)})"
-    return Try(words, (*OF_OPTIMA, function.__name__), (key,), lambda: function(**given), _nothing)
+    return Try(words, (*OF_OPTIMA, function.__name__), (key,), lambda: _found(function, given), _nothing)
+
+
+def _found(function: Callable[..., Any], given: dict[str, Any]) -> Any:
+    """What an optimum finds; that it finds nothing is documented as a RuntimeError."""
+    try:
+        return function(**given)
+    except RuntimeError:
+        return None
 
 
 OF_OPTIMA = ("snapshot test", "cumulative test", "optimum", "linear test", "must")
@@ -412,6 +459,7 @@ OF_OPTIMA = ("snapshot test", "cumulative test", "optimum", "linear test", "must
 
 GENERATORS: tuple[Callable[[np.random.Generator], Try], ...] = (
     _parts, _parts, _parts, _environments, _environments, _resets, _actions, _others, _optima,
+    _settings,
 )  # fmt: skip
 
 
