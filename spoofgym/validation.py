@@ -386,11 +386,11 @@ def _real(owner: str, name: str, value: Any, wanted: str) -> float:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     number = math.nan
-    if not isinstance(value, str | bytes | bool | np.bool_ | np.ndarray | np.complexfloating):
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
         try:
             number = float(value)
-        except (TypeError, ValueError, OverflowError):
-            number = math.nan
+        except OverflowError:  # an integer of hundreds of digits
+            number = math.inf
     if not math.isfinite(number):
         raise ValueError(_message(owner, name, wanted, given))
     return number

@@ -9,7 +9,7 @@ from spoofgym import validation
 
 NO_NUMBERS = (
     float("nan"), float("inf"), "5", b"5", True, np.bool_(True), None, [1.0], np.array([1.0]), 1j, np.complex128(1.0),
-    10**400, object(), np.array("x"),
+    10**400, object(), np.array("x"), Decimal(1),
 )  # fmt: skip
 CHECKS = (
     validation.finite, validation.non_negative, validation.zero_or_above, validation.above, validation.probability,
@@ -25,7 +25,7 @@ def test_no_number_is_refused_by_name(check, value):
         check("ramp", "rate", value)
 
 
-@pytest.mark.parametrize("value", [2, 2.0, np.float32(2.0), np.int64(2), np.array(2.0), Decimal(2)])
+@pytest.mark.parametrize("value", [2, 2.0, np.float32(2.0), np.int64(2), np.array(2.0), np.longdouble(2)])
 def test_numbers_of_every_kind_become_plain_ones(value):
     for check in (validation.finite, validation.above):
         assert type(check("ramp", "rate", value)) is float
