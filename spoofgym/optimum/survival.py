@@ -21,7 +21,7 @@ from spoofgym.arrays import Floats
 
 # Beyond this distance of |u| from √threshold the leading term of the asymptotic expansion replaces the mixture.
 _FAR = 1000.0
-LARGEST_THRESHOLD = 5000.0
+LARGEST_THRESHOLD = 2000.0
 """Of the snapshot test: no fix that noise alone makes comes near it. Beyond it a score can have no digits left."""
 
 
