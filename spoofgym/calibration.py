@@ -36,6 +36,7 @@ from spoofgym.validation import written
 
 RUNS = 5000
 FIRST_ALARMS = 200
+MOST_FIRST_ALARMS = 1_000_000
 SIMULATED_FIRST_ALARMS = 100
 SLOPE_RUNS = 1000
 CONFIDENCE = 0.95
@@ -83,7 +84,7 @@ class _Search:
         self.detector = detector
         self.result: Calibration | None = None
         self._arl0 = validation.average_run_length("calibration", "arl0", arl0)
-        self._first_alarms = validation.whole("calibration", "first_alarms", first_alarms, 10)
+        self._first_alarms = validation.whole("calibration", "first_alarms", first_alarms, 10, MOST_FIRST_ALARMS)
         self._counted = FirstAlarms()
 
     def add(self, burn_in: Floats, statistics: Floats) -> None:

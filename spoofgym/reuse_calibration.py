@@ -41,6 +41,7 @@ def coasting_nis(scenario: Scenario, fidelity: str = "linear", runs: int = RUNS,
     Raises:
         ValueError: the scenario has no randomness, or its game is too short to coast in.
     """
+    runs, seed = validation.runs("reuse", "runs", runs), validation.whole("reuse", "seed", seed, 0)
     if not scenario.random:
         raise ValueError(
             f"scenario {scenario.name!r} has one realisation, nothing can be calibrated in it: give a reuse_threshold"

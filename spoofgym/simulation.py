@@ -124,11 +124,8 @@ class Simulation:
         self.clock_offset = np.zeros(num_runs)
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
-        self._require_clean_starts()
-
-    def _require_clean_starts(self) -> None:
-        if self.scenario.random:
-            require_clean_starts(self.scenario.name, list(self.detectors.values()), self._passing)
+        if scenario.random:
+            require_clean_starts(scenario.name, list(self.detectors.values()), self._passing)
 
     def _bind_attack(self, attack: Attack) -> None:
         if attack.needs_velocity and (self.scenario.dimension != 6 or self.scenario.coupling == "tight"):
@@ -349,6 +346,7 @@ class Simulation:
                 or none where there is no attack.
 
         Raises:
+            ValueError: an offset that is not finite or has another shape.
             RuntimeError: a run has no epoch left.
             FilterDivergedError: the filter of a run has diverged, and the simulation does not hold it.
         """
@@ -358,7 +356,8 @@ class Simulation:
         following = navigator.index + 1
         clock = Clock(following - self.burn_in, self._times[following])
         attack = self.attack if offset is None else None
-        spoof = self._spoof(clock, attack, self._no_offset if offset is None else np.asarray(offset, dtype=np.float64))
+        given = self._no_offset if offset is None else validation.rows(OWNER, "offset", offset, self.num_runs, (3, 4))
+        spoof = self._spoof(clock, attack, given)
         deviation = self._noise[self._all, following]
         deviation += self.scenario.spoofed(self.fidelity, following, self.burn_in, spoof)
         self.offset, self.clock_offset = spoof.offset, spoof.clock
@@ -426,5 +425,6 @@ class Simulation:
 class _Trial(Simulation):
     """A simulation whose burn-in is tried, and which is never played."""
 
-    def _require_clean_starts(self) -> None:
-        """Nothing: this is the trial."""
+    def _passing(self, detectors: Sequence[Detector], runs: int) -> int:
+        """All of them: a trial is not tried itself."""
+        return runs

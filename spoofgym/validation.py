@@ -257,6 +257,28 @@ def triple(owner: str, name: str, values: Any, axes: str = "E, N, U") -> tuple[f
     return first, second, third
 
 
+def rows(owner: str, name: str, values: Any, count: int, widths: tuple[int, ...]) -> Floats:
+    """The values as finite numbers, a row for each run; cheap enough for every step.
+
+    Args:
+        owner: whose argument.
+        name: of the argument.
+        values: that were given.
+        count: rows there must be.
+        widths: numbers that a row may hold.
+
+    Raises:
+        ValueError: they are not.
+    """
+    array = real_array(values)
+    if array is None or array.ndim != 2 or len(array) != count or array.shape[1] not in widths:
+        shapes = " or ".join(f"({count}, {width})" for width in widths)
+        raise ValueError(_message(owner, name, f"finite numbers of shape {shapes}", values))
+    if not np.isfinite(array).all():
+        raise ValueError(_message(owner, name, "finite numbers", values))
+    return array.astype(np.float64, copy=False)
+
+
 def span(owner: str, name: str, values: Any) -> tuple[float, float]:
     """The values as two finite numbers greater than zero, the least first.
 
@@ -364,11 +386,11 @@ def _real(owner: str, name: str, value: Any, wanted: str) -> float:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     number = math.nan
-    if not isinstance(value, str | bytes | bool | np.bool_ | np.ndarray | np.complexfloating):
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
         try:
             number = float(value)
-        except (TypeError, ValueError, OverflowError):
-            number = math.nan
+        except OverflowError:  # an integer of hundreds of digits
+            number = math.inf
     if not math.isfinite(number):
         raise ValueError(_message(owner, name, wanted, given))
     return number

@@ -237,10 +237,22 @@ def test_thresholds_that_alarm_in_nearly_every_burn_in_are_told_with_their_detec
         simulation(matched(), 1, detectors=[Windowed(4, threshold=2.0)])
 
 
+@pytest.mark.parametrize(
+    "offset", [np.zeros((2, 2)), np.zeros((3, 3)), np.zeros(3), np.full((2, 3), np.nan), "x", [[1j] * 3] * 2]
+)
+def test_an_offset_that_is_none_is_refused(offset):
+    sim = simulation(matched(), 2, attack=None)
+    sim.reset()
+    sim.resolve()
+    with pytest.raises(ValueError, match="Simulation: offset must be finite numbers"):
+        sim.observe(offset)
+    sim.observe(np.zeros((2, 3)))
+
+
 def test_the_trial_of_thresholds_leaves_the_runs_as_they_are(monkeypatch):
     detectors = [Windowed(4, threshold=14.0), Windowed(6, threshold=1e6)]
     tried = simulation(coloured(), 3, detectors=copy.deepcopy(detectors))
-    monkeypatch.setattr(Simulation, "_require_clean_starts", lambda self: None)
+    monkeypatch.setattr(Simulation, "_passing", lambda self, detectors, runs: runs)
     untried = simulation(coloured(), 3, detectors=copy.deepcopy(detectors))
     for sim in (tried, untried):
         sim.reset()
@@ -252,7 +264,7 @@ def test_the_trial_of_thresholds_leaves_the_runs_as_they_are(monkeypatch):
 
 
 def test_an_alarm_in_every_burn_in_all_the_same_names_the_thresholds(monkeypatch):
-    monkeypatch.setattr(Simulation, "_require_clean_starts", lambda self: None)
+    monkeypatch.setattr(Simulation, "_passing", lambda self, detectors, runs: runs)
     sim = simulation(coloured(), 2, detectors=[Windowed(4, threshold=1e-9)])
     with pytest.raises(RuntimeError, match=r"2 runs alarm in each of 100 clean burn-ins: threshold 1e-09 of 'windowed"):
         sim.reset()

@@ -35,7 +35,8 @@ class AroundAttack(Attack):
         Raises:
             ValueError: the attack inside does not fit the game.
         """
-        self.attack.bind(timeline, num_runs)
+        with validation.argument(self.kind, "attack"):
+            self.attack.bind(timeline, num_runs)
         super().bind(timeline, num_runs)
 
     def follow(self, velocity: Floats) -> None:
@@ -47,7 +48,11 @@ class AroundAttack(Attack):
         self.attack.study(model)
 
     def meet(self, satellites: Runs) -> None:
-        """Tell the attack inside the numbers of the satellites in the game."""
+        """Tell the attack inside the numbers of the satellites in the game.
+
+        Raises:
+            ValueError: it is to capture one that is not among them.
+        """
         self.attack.meet(satellites)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:

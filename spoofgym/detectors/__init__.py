@@ -119,7 +119,8 @@ def at_arl0(text: str, arl0: float) -> str:
         raise ValueError(f"unknown detector {specification.name!r}; valid names: {', '.join(sorted(DETECTORS))}")
     if decided or "arl0" not in inspect.signature(factory).parameters:
         return text
-    return str(replace(specification, options={**specification.options, "arl0": write(float(arl0))}))
+    asked = write(validation.average_run_length(specification.name, "arl0", arl0))
+    return str(replace(specification, options={**specification.options, "arl0": asked}))
 
 
 def make_detector(detector: str | Detector) -> Detector:

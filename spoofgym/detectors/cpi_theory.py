@@ -37,7 +37,7 @@ def cpi_threshold(p_fa: float, num_epochs: int) -> float:
         ValueError: a value is out of range.
     """
     validation.probability(OWNER, "p_fa", p_fa)
-    return quantile(p_fa, validation.whole(OWNER, "num_epochs", num_epochs, 1))
+    return quantile(p_fa, validation.epochs(OWNER, "num_epochs", num_epochs))
 
 
 def ci_threshold(p_fa: float, num_epochs: int, num_measurements: int) -> float:
@@ -48,8 +48,8 @@ def ci_threshold(p_fa: float, num_epochs: int, num_measurements: int) -> float:
     Raises:
         ValueError: a value is out of range.
     """
-    num_measurements = validation.whole(OWNER, "num_measurements", num_measurements, 1)
-    return cpi_threshold(p_fa, validation.whole(OWNER, "num_epochs", num_epochs, 1) * num_measurements)
+    num_measurements = validation.epochs(OWNER, "num_measurements", num_measurements)
+    return cpi_threshold(p_fa, validation.epochs(OWNER, "num_epochs", num_epochs) * num_measurements)
 
 
 def position_information(design: Floats, innovation_covariance: Floats) -> Floats:
@@ -90,7 +90,7 @@ def gauss_markov_covariance(num_epochs: int, sigma: float, time: float, interval
     Raises:
         ValueError: a value is out of range.
     """
-    epochs = np.arange(validation.whole(OWNER, "num_epochs", num_epochs, 1))
+    epochs = np.arange(validation.epochs(OWNER, "num_epochs", num_epochs))
     variance = validation.non_negative(OWNER, "sigma", sigma) ** 2
     validation.above(OWNER, "interval", interval)
     if validation.non_negative(OWNER, "time", time) == 0.0:
@@ -122,7 +122,7 @@ def missed_detection_gaussian(p_fa: float, num_epochs: int, kappa: Floats | floa
         ValueError: a value is out of range.
     """
     threshold = -special.ndtri(validation.probability(OWNER, "p_fa", p_fa))
-    shift = np.sqrt(0.5 * validation.whole(OWNER, "num_epochs", num_epochs, 1)) * np.asarray(kappa)
+    shift = np.sqrt(0.5 * validation.epochs(OWNER, "num_epochs", num_epochs)) * np.asarray(kappa)
     return special.ndtr((threshold - shift) / (1.0 + np.asarray(kappa)))
 
 
@@ -196,7 +196,7 @@ def minimum_epochs(required: float, missed: Callable[[int], float], most: int) -
         ValueError: a value is out of range.
     """
     validation.probability(OWNER, "required", required)
-    windows = range(1, validation.whole(OWNER, "most", most, 1) + 1)
+    windows = range(1, validation.epochs(OWNER, "most", most) + 1)
     return next((window for window in windows if missed(window) <= required), None)
 
 

@@ -56,7 +56,8 @@ class Cusum(ThresholdDetector):
     kind = "cusum"
 
     def __init__(self, k: float = DEFAULT_SCALE, threshold: float | None = None, arl0: float | None = None) -> None:
-        self.k = validation.between(self.kind, "k", k, LEAST_SCALE, validation.LARGEST)
+        scale = validation.above(self.kind, "k", k, 1.0)
+        self.k = validation.between(self.kind, "k", scale, LEAST_SCALE, validation.LARGEST)
         self.memory = forgetting(POSITION * (self.k - 1.0), 2.0 * POSITION)
         self.set_up(threshold, arl0, k=self.k)
 

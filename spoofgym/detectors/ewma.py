@@ -34,7 +34,8 @@ class _ExponentialAverage(ThresholdDetector):
     def __init__(
         self, weight: float = DEFAULT_WEIGHT, threshold: float | None = None, arl0: float | None = None
     ) -> None:
-        self.weight = validation.between(self.kind, "weight", weight, LEAST_WEIGHT, MOST_WEIGHT)
+        share = validation.probability(self.kind, "weight", weight)
+        self.weight = validation.between(self.kind, "weight", share, LEAST_WEIGHT, MOST_WEIGHT)
         self.memory = forgetting(self.weight)
         self._variance = steady_variance(self.weight)
         self.set_up(threshold, arl0, weight=self.weight)

@@ -55,9 +55,10 @@ class SignedMean(ThresholdDetector):
         self.n = validation.epochs(self.kind, "n", n, 1)
         self.memory = self.n - 1
         validation.at_most_one(self.kind, threshold=threshold, p_fa=p_fa, arl0=arl0)
-        self.set_up(threshold, arl0, n=self.n, p_fa=p_fa)
-        if p_fa is not None:
-            self.threshold = quantile(validation.probability(self.kind, "p_fa", p_fa), HORIZONTAL)
+        p_exceeds = None if p_fa is None else validation.probability(self.kind, "p_fa", p_fa)
+        self.set_up(threshold, arl0, n=self.n, p_fa=p_exceeds)
+        if p_exceeds is not None:
+            self.threshold = quantile(p_exceeds, HORIZONTAL)
             self.target_arl0 = None
 
     def bind(self, num_runs: int, dimension: int) -> None:

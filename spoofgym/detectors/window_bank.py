@@ -32,7 +32,7 @@ def window_lengths(owner: str, name: str, text: object) -> tuple[int, ...]:
     increasing = all(before < after for before, after in zip((0, *lengths), lengths, strict=False))
     if len(lengths) < len(pieces) or not increasing or lengths[-1] > validation.LONGEST:
         raise ValueError(
-            f"{owner}: {name} must be whole numbers, 1 or more, increasing and {validation.LONGEST} at most, with + "
+            f"{owner}: {name} must be whole numbers, 1 or more and increasing, {validation.LONGEST} at most, with + "
             f"between, e.g. 5+20; got {validation.shown(text)}"
         )
     return lengths

@@ -212,6 +212,10 @@ class DefenderEnv(SingleEnv):
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
+    Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
+    valid. Numbers have limits far beyond what a game needs, so that nothing overflows and memory stays in bounds:
+    `error_scale` and `error_clip` lie from 1e-6 to 1e6, `exclusion_cost` is 1e6 at most.
+
     ## Vectorized environment
 
     `gymnasium.make_vec("spoofgym:spoofgym/Defender-v0", num_envs=64)` builds the native `DefenderVectorEnv`, which

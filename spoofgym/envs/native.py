@@ -17,7 +17,8 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.envs.config import check_options, configure
 from spoofgym.simulation import Simulation
 
-MOST_LANES = 100_000
+MOST_LANES = 20_000
+"""A defender's lane takes 100 kB and more: the history of its filter."""
 
 Observations = NDArray[np.float32]
 Values = dict[str, Any]

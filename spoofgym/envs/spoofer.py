@@ -175,6 +175,10 @@ class SpooferEnv(SingleEnv):
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
+    Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
+    valid. Numbers have limits far beyond what a game needs, so that nothing overflows and memory stays in bounds:
+    `frames` is 1000 at most, `tracking_sigma` 1e6 m, `forfeit` 1e6.
+
     `tracking_sigma`: the spoofer knows the vehicle's position with this error per axis and epoch, which adds to the
     offset that it means to send, and its velocity with an independent one over the interval. It changes what is sent
     and seen, not how it is scored. Both are white, or with a `tracking_time` first-order Gauss-Markov. The offset of

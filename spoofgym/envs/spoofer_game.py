@@ -32,8 +32,8 @@ from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 
 OWNER = "Spoofer-v0"
-MOST_ENTRIES = 2**28
-"""Of the observations of all lanes: a gigabyte."""
+MOST_ENTRIES = 2**26
+"""Of the observations of all lanes: 256 MiB."""
 INNOVATION_UNIT = 4.0
 """One unit of the innovation action, in sigma per axis."""
 
@@ -99,6 +99,14 @@ class SpooferGame:
         names = [detector.name for detector in detectors]
         if len(set(names)) < len(names):
             raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
+        dimension = 3 if self._ranges else scenario.dimension
+        fields = spoofer_fields(config.knowledge, dimension, tuple(names), self._ranges)
+        self.fields = stacked_fields(fields, config.frames)
+        if num_lanes * len(self.fields) > MOST_ENTRIES:
+            raise ValueError(
+                f"{OWNER}: frames times num_envs must leave {MOST_ENTRIES} entries of observations at most, got frames="
+                f"{config.frames} with num_envs={num_lanes}"
+            )
         with validation.argument(OWNER, "response"):
             response: Response | None = deepcopy(make_response(config.response))
         if config.on_alarm == "end":
@@ -120,14 +128,6 @@ class SpooferGame:
             with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):
                 believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
                 self.shadow = self._shadow_filter(believed)
-        dimension = 3 if self._ranges else scenario.dimension
-        fields = spoofer_fields(config.knowledge, dimension, tuple(self.simulation.detectors), self._ranges)
-        self.fields = stacked_fields(fields, config.frames)
-        if num_lanes * len(self.fields) > MOST_ENTRIES:
-            raise ValueError(
-                f"{OWNER}: frames times num_envs must leave {MOST_ENTRIES} entries of observations at most, got frames="
-                f"{config.frames} with num_envs={num_lanes}"
-            )
         self.observation_space = observation_space(self.fields)
         rates = (*scenario.drag_off_rate, scenario.clock_rate) if self._ranges else scenario.drag_off_rate
         self.action_space = spaces.Box(-1.0, 1.0, (len(rates),), np.float32)

@@ -133,7 +133,7 @@ def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, 
     Raises:
         ValueError: the scenario has no odometer, or there is no run.
     """
-    validation.whole("acna_study", "runs", runs, 1)
+    validation.runs("acna_study", "runs", runs)
     pairs = len(epochs)
     right, false, missed = np.zeros(pairs), np.zeros(pairs), np.zeros(pairs)
     clean = spoofed = 0

@@ -108,7 +108,7 @@ def integrity(
         ValueError: a shape or a value does not fit.
     """
     error, protection_level = checked(OWNER, error, protection_level, alert_limit)
-    validation.whole(OWNER, "time_to_alert", time_to_alert, 0)
+    time_to_alert = validation.epochs(OWNER, "time_to_alert", time_to_alert, 0)
     alarm = np.asarray(alarm, dtype=np.bool_)
     if error.ndim != 2 or alarm.shape != error.shape:
         raise ValueError(f"{OWNER}: error and alarm must be (N, K), got {error.shape} and {alarm.shape}")

@@ -53,7 +53,7 @@ class AuxiliaryRule:
 
     def __post_init__(self) -> None:
         validation.one_of("auxiliary rule", "anchoring", self.anchoring, ANCHORING)
-        validation.whole("auxiliary rule", "credit", self.credit, 1)
+        validation.epochs("auxiliary rule", "credit", self.credit)
 
     @property
     def needed(self) -> int:

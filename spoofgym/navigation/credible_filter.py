@@ -53,7 +53,7 @@ class CredibleTuning:
     def __post_init__(self) -> None:
         for name in ("step", "acceleration", "auxiliary_sigma", "fix_sigma", "height_sigma"):
             validation.above("credible filter", name, getattr(self, name))
-        validation.whole("credible filter", "samples", self.samples, 1)
+        validation.epochs("credible filter", "samples", self.samples)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -118,7 +118,7 @@ def bounded_optimum(model: LinearModel, threshold: float, drag_off_rate: Floats 
         ValueError: a threshold or a drag-off rate that is not positive.
         RuntimeError: the best solution is no maximum.
     """
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     rates = axis_limits(drag_off_rate)
     limits = (np.diff(model.time)[:, None] * rates).reshape(-1)
     log_score = LogScore(model, threshold)

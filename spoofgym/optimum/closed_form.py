@@ -79,7 +79,7 @@ def best_budget(model: LinearModel, threshold: float) -> tuple[ClosedForm, Outco
         ValueError: m is not 3, or a threshold that is not positive.
     """
     check_position_fix(model, "a closed form")
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     num_epochs = model.num_epochs
     _, _, profile = _furthest(error_response(model, num_epochs))
     magnitude = np.linalg.norm(profile, axis=1)

@@ -18,7 +18,9 @@ from spoofgym import validation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.closed_form import ClosedForm, noncentrality_optimum
 from spoofgym.optimum.response import check_epochs
-from spoofgym.optimum.survival import check_threshold, log_survival
+from spoofgym.optimum.survival import log_survival
+
+MOST_DEGREES = 1_000_000
 
 
 def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> float:
@@ -34,8 +36,8 @@ def missed_magnitude(threshold: float, degrees: int, missed: float = 0.5) -> flo
     Raises:
         ValueError: a value out of range, or a threshold so low that the test alarms more often without any bias.
     """
-    check_threshold(threshold)
-    degrees = validation.whole("cumulative test", "degrees", degrees, 1)
+    threshold = validation.above("cumulative test", "threshold", threshold, largest=MOST_DEGREES)
+    degrees = validation.whole("cumulative test", "degrees", degrees, 1, MOST_DEGREES)
     missed = validation.probability("cumulative test", "missed", missed)
 
     def excess(magnitude: float) -> float:

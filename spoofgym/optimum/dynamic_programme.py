@@ -60,7 +60,7 @@ def dynamic_programme(model: LinearModel, threshold: float, azimuth: float, tole
         ValueError: a threshold or tolerance that is not positive.
         RuntimeError: the score still changes after eight halvings.
     """
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     tolerance = validation.above("dynamic_programme", "tolerance", tolerance)
     azimuth = validation.finite("dynamic_programme", "azimuth", azimuth)
     gain = aimed_gain(error_response(model, model.num_epochs), np.array([azimuth]))[0]

@@ -37,10 +37,11 @@ class LinearTest:
     limit: float
 
     def __post_init__(self) -> None:
-        if self.weights.ndim != 2 or not self.weights.size or not np.isfinite(self.weights).all():
-            raise ValueError(
-                f"linear test {self.name!r}: weights must be finite and of shape (n, m), got {self.weights!r}"
-            )
+        weights = validation.real_array(self.weights)
+        if weights is None or weights.ndim != 2 or not weights.size or not np.isfinite(weights).all():
+            given = validation.shown(self.weights)
+            raise ValueError(f"linear test {self.name!r}: weights must be finite and of shape (n, m), got {given}")
+        object.__setattr__(self, "weights", weights)
         validation.above(f"linear test {self.name!r}", "limit", self.limit)
 
     def rows(self, num_epochs: int, dimension: int) -> sparse.csr_matrix:

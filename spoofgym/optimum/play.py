@@ -62,7 +62,7 @@ def expected_play(model: LinearModel, offsets: Floats, threshold: float) -> Outc
     Raises:
         ValueError: offsets of another shape or not finite, or a threshold that is not positive.
     """
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     offsets = np.asarray(offsets, dtype=np.float64)
     num_epochs = model.num_epochs
     if offsets.ndim not in (2, 3) or offsets.shape[-2:] != (num_epochs, 3):

@@ -53,7 +53,7 @@ def best_ramp(
     Raises:
         ValueError: a threshold or a drag-off rate that is not positive.
     """
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     limit = axis_limits(drag_off_rate)[:2]
     elapsed = (model.time[1:] - model.time[0])[:, None]
     unit = np.stack([np.hstack((elapsed * axis, np.zeros_like(elapsed))) for axis in np.eye(2)])
@@ -77,6 +77,10 @@ def best_ramp(
     return BestRamp(float(rate[best]), float(direction), outcome)
 
 
+RATES = (1e-6, 1e6)
+"""Least and largest limit of a rate, m/s."""
+
+
 def axis_limits(drag_off_rate: Floats | float | None) -> Floats:
     """The largest rate of the offset per axis, (3,), m/s ENU; infinite where there is no limit.
 
@@ -87,6 +91,8 @@ def axis_limits(drag_off_rate: Floats | float | None) -> Floats:
     if limits is None or limits.shape not in ((), (3,)) or not (limits > 0.0).all():
         given = validation.shown(drag_off_rate)
         raise ValueError(f"drag_off_rate must be one positive number or three (east, north, up), got {given}")
+    for limit in limits[np.isfinite(limits)].tolist():
+        validation.between("optimum", "drag_off_rate", limit, *RATES)
     return np.broadcast_to(np.asarray(limits, dtype=np.float64), (3,))
 
 

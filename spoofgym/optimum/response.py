@@ -18,7 +18,7 @@ def check_epochs(model: LinearModel, num_epochs: object) -> None:
         ValueError: fewer than one epoch, or more than the model's K.
     """
     available = model.num_epochs
-    if not isinstance(num_epochs, int | np.integer) or not 1 <= num_epochs <= available:
+    if isinstance(num_epochs, bool) or not isinstance(num_epochs, int | np.integer) or not 1 <= num_epochs <= available:
         raise ValueError(
             f"num_epochs must lie in 1..{available} (the epochs of the model), got {validation.shown(num_epochs)}"
         )

@@ -21,17 +21,17 @@ from spoofgym.kernels import njit
 
 # Beyond this distance of |u| from √threshold the leading term of the asymptotic expansion replaces the mixture.
 _FAR = 1000.0
-LARGEST_THRESHOLD = 1e6
-"""With a larger one the mixture has too many terms."""
+LARGEST_THRESHOLD = 2000.0
+"""Of the snapshot test: no fix that noise alone makes comes near it. Beyond it a score can have no digits left."""
 
 
-def check_threshold(threshold: float) -> None:
-    """Refuse a threshold that no snapshot test can have.
+def check_threshold(threshold: float) -> float:
+    """The threshold, if a snapshot test can have it.
 
     Raises:
         ValueError: the threshold is not a positive number of at most `LARGEST_THRESHOLD`.
     """
-    validation.above("snapshot test", "threshold", threshold, largest=LARGEST_THRESHOLD)
+    return validation.above("snapshot test", "threshold", threshold, largest=LARGEST_THRESHOLD)
 
 
 def log_survival(magnitude: Floats, dimension: int, threshold: float) -> Floats:

@@ -59,7 +59,7 @@ def upper_bound(model: LinearModel, threshold: float) -> UpperBound:
     Raises:
         ValueError: a threshold that is not positive.
     """
-    check_threshold(threshold)
+    threshold = check_threshold(threshold)
     response = error_response(model, model.num_epochs)
     azimuth: Floats = np.linspace(0.0, 180.0, NUM_DIRECTIONS, endpoint=False)
     gain = aimed_gain(response, azimuth)

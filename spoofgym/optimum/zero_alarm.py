@@ -60,6 +60,10 @@ class ZeroAlarm:
     binding: dict[str, Runs]
 
 
+SHARES = (1e-6, 1e3)
+"""Least and largest share of the limits that a mean may use."""
+
+
 def zero_alarm(
     model: LinearModel,
     tests: Sequence[LinearTest],
@@ -80,7 +84,7 @@ def zero_alarm(
         RuntimeError: a programme is not solved, or the directions do not come together.
     """
     check_position_fix(model, "a zero-alarm attack")
-    share = validation.above("zero_alarm", "share", share)
+    share = validation.between("zero_alarm", "share", share, *SHARES)
     rows = _rows(model, tests, share, axis_limits(drag_off_rate))
     gain = error_response(model, model.num_epochs).reshape(2, -1)
     error, whitened, bound = _furthest(gain, sparse.vstack([part for _, part in rows]).tocsr())

@@ -20,6 +20,7 @@ from spoofgym.sensors.constellation import Constellation as Constellation
 TYPICAL_FLIGHT_TIME = 0.075
 """Of a GPS signal, s: between that from the zenith and that from the horizon."""
 MINIMUM_SATELLITES = 4
+MOST_SLOTS = 100
 SINGULAR = 1e-12
 """Share of a diagonal element of the normal matrix that its pivot must leave."""
 
@@ -102,7 +103,7 @@ def view(
     sight = lines_of_sight(position, path)
     elevation = np.arcsin(np.clip(sight[..., 2], -1.0, 1.0))
     visible = elevation >= lowest
-    width = int(visible.sum(axis=1).max()) if slots is None else validation.whole("view", "slots", slots, 1)
+    width = int(visible.sum(axis=1).max()) if slots is None else validation.whole("view", "slots", slots, 1, MOST_SLOTS)
     column = _assign(visible, elevation, width)
     present = column >= 0
 

@@ -47,9 +47,13 @@ class Receiver:
                 continue
             for value in validation.triple("receiver", name, values):
                 validation.non_negative("receiver", name, value)
-        if any(self.markov_sigma):
-            validation.above("receiver", "markov_time", self.markov_time)
-        elif self.markov_time != 0.0:
+        time = validation.zero_or_above("receiver", "markov_time", self.markov_time)
+        if any(self.markov_sigma) and not time:
+            raise ValueError(
+                "receiver: markov_time must be a finite number greater than 0, got "
+                f"{self.markov_time!r} beside a markov_sigma"
+            )
+        if time and not any(self.markov_sigma):
             raise ValueError(f"receiver: markov_time {self.markov_time!r} needs a markov_sigma beside it")
         validation.non_negative("receiver", "latency", self.latency)
         if self.latency >= self.interval:

@@ -162,13 +162,12 @@ def test_simulation_refuses():
     scenario = make_scenario("liu-flight:horizon=30")
     with pytest.raises(ValueError, match="detector 'windowed:n=5' has no threshold yet: calibrate it first"):
         Simulation(scenario, None, [make_detector("windowed:n=5")])
-    with pytest.raises(ValueError, match="num_runs must be 1 or more, got 0"):
+    with pytest.raises(ValueError, match="num_runs must be a whole number, 1 or more, got 0"):
         Simulation(scenario, num_runs=0)
     with pytest.raises(ValueError, match="no fidelity 'exact'; valid fidelities: linear, strapdown"):
         Simulation(scenario, fidelity="exact")
-    low = Simulation(scenario, None, [make_detector("windowed:n=5,threshold=1e-3")], None, 3, seed=0)
-    with pytest.raises(RuntimeError, match="3 runs alarm in every clean burn-in: the thresholds are far too low"):
-        low.reset()
+    with pytest.raises(ValueError, match=r"threshold 0.001 of 'windowed:n=5,threshold=0.001' is far too low"):
+        Simulation(scenario, None, [make_detector("windowed:n=5,threshold=1e-3")], None, 3, seed=0)
     short = Simulation(make_scenario("liu-flight:horizon=1"), seed=0)
     short.reset()
     short.resolve()

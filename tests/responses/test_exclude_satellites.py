@@ -217,8 +217,8 @@ def test_a_spoofer_of_all_satellites_is_not_resisted():
 def test_it_does_not_listen_to_detectors():
     detector = make_detector("snapshot:threshold=1e-6")
     simulation = Simulation(FLIGHT, None, [detector], make_response("exclude-satellites"), 4, 0)
-    with pytest.raises(RuntimeError, match="the thresholds are far too low"):
-        Simulation(FLIGHT, None, [make_detector("cpi:n=2,threshold=1e-9")], None, 1, 0).reset()
+    with pytest.raises(ValueError, match="is far too low"):
+        Simulation(FLIGHT, None, [make_detector("cpi:n=2,threshold=1e-9")], None, 1, 0)
     simulation.reset()
     for _ in range(5):
         simulation.resolve()

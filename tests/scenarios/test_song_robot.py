@@ -101,7 +101,7 @@ def test_the_name_builds_it(name):
         ("song-robot:data=circle", "data must be one of rectangle, static, got 'circle'"),
         ("song-robot:noise=pink", "noise must be one of markov, white, got 'pink'"),
         ("song-robot:odometer=c", "odometer must be one of set-a, set-b, table-1, got 'c'"),
-        ("song-robot:auxiliary=loose", "anchoring must be one of anchored, credited, free, got 'loose'"),
+        ("song-robot:auxiliary=loose", "auxiliary must be one of anchored, credited, free, got 'loose'"),
         ("song-robot:credit=3", "credit 3 is of auxiliary 'credited', got auxiliary 'anchored'"),
         ("song-robot:sigma=0", "sigma must be a finite number greater than 0, got 0.0"),
         ("song-robot:horizon=0", "horizon must be a whole number, 1 or more, got 0"),

@@ -7,17 +7,16 @@ Parts and their parameters are taken from the registries and signatures, so that
 from __future__ import annotations
 
 import inspect
-import re
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
-from decimal import Decimal
+from dataclasses import fields, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from spoofgym import optimum
 from spoofgym.attacks import ATTACKS, make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors import DETECTORS, make_detector
@@ -26,129 +25,45 @@ from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
+from spoofgym.navigation.adaptation import Adaptation
+from spoofgym.navigation.credible import AuxiliaryRule
+from spoofgym.navigation.credible_filter import CredibleTuning
 from spoofgym.navigation.facts import RANGES
+from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.parallel import RunSlices
 from spoofgym.responses import RESPONSES, make_response
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import SCENARIOS, make_scenario
+from spoofgym.sensors.confounders import Disturbances
+from spoofgym.sensors.imu import grade
+from spoofgym.sensors.odometer import Odometer
+from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.trajectory import Accelerate, Climb, Straight, Turn
+from tests.stress.hostile import ACTIONS, hostile, hostile_text, shown
+from tests.stress.tries import Try, broken_promise
 
 LOOSE, TIGHT, LONG = "liu-flight:horizon=12", "kujur-flight:horizon=12,onset=60", "foi-drive:horizon=30"
 UNMATCHED = "foi-drive:receiver=foi,onset=60,horizon=12"
 LONG_TIGHT = "kujur-flight:horizon=60,onset=60"
+QUICK: dict[str, dict[str, Any]] = {"kujur-flight": {"horizon": 12, "onset": 60.0}, "liu-flight": {"horizon": 12}}
+"""Options that make a scenario short, where it has them."""
 STEPS = 4
-REFUSED = (ValueError, TypeError)
-
-NUMBERS: tuple[Any, ...] = (
-    float("nan"), float("inf"), float("-inf"), 0, 0.0, -0.0, -1, -1.0, 0.5, 1.5, 1, 2, 3.0, 1e-300, -1e-300, 5e-324,
-    1e300, -1e300, 1.7e308, 1e160, 1e19, 1e9, -1e9, 10**30, -(10**30), 10**400, 99999999, 2**63, 2**64, 100001,
-    np.float64("nan"), np.float32(1e30), np.float16(2.0), np.int64(-3), np.int64(2), np.uint64(2**63), np.longdouble(2),
-    np.array(2.0), np.array(float("nan")), np.array([1.0, 2.0]), np.array([]), Decimal("2"), Decimal("NaN"),
-)  # fmt: skip
-OTHERS: tuple[Any, ...] = (
-    True, False, np.bool_(True), None, "", " ", "x", "90", "nan", "1e300", "\0", "x" * 10_000, "9" * 5000, b"5", [],
-    [1], [[]], (), (1, 2), {}, {"a": 1}, set(), 1j, np.complex128(1 + 1j), np.array(1j), np.array(["x"]),
-    np.array([None, 1], dtype=object), object(), int, range(3), len, np.datetime64("2020-01-01"), Ellipsis,
-)  # fmt: skip
-TEXTS = (
-    "nan", "inf", "-inf", "1e300", "-1e300", "1e-300", "5e-324", "1e400", "-1", "-0", "0", "0.5", "1", "2", "1e9",
-    "1e19", "99999999", "100001", "9" * 5000, "0x10", "1_0", "true", "false", "none", "x", "é", "٣", "x" * 5000, "1+1",
-    "5+20", "a/b", "~", "+", "/", "ramp/1", "ramp:nan", "ramp:1e300", "ramp:1/onset=1e9",
-    "snapshot+windowed", "'", "\\", "\t", "",
-)  # fmt: skip
-EXPONENTS = ((-300, 300), (-12, 12), (-6, 6), (-2, 2))
-ACTIONS: tuple[Any, ...] = (
-    None, "x", "", b"1", object(), [], {}, True, 1j, 1e19, 1e300, float("nan"), float("inf"), 10**30, -1, 0.5, 99,
-    np.float32(np.inf), np.longdouble("1e4000"), np.uint64(2**63),
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Try:
-    """One try.
-
-    Attributes:
-        words: what was done, to do it again.
-        owners: one of these, and
-        arguments: one of these must stand in the message of a refusal.
-        build: makes the thing.
-        play: plays it.
-    """
-
-    words: str
-    owners: tuple[str, ...]
-    arguments: tuple[str, ...]
-    build: Callable[[], Any]
-    play: Callable[[Any], None]
 
 
 def fuzz(seed: int, tries: int) -> list[str]:
     """Make tries; the broken promises."""
+    return [words for attempt in attempts(seed, tries) if (words := broken_promise(attempt))]
+
+
+def attempts(seed: int, tries: int) -> Iterator[Try]:
+    """The tries of `fuzz`, one by one."""
     rng = np.random.default_rng(seed)
-    broken = []
     for _ in range(tries):
-        attempt = GENERATORS[int(rng.integers(len(GENERATORS)))](rng)
-        if words := broken_promise(attempt):
-            broken.append(words)
-    return broken
-
-
-def broken_promise(attempt: Try) -> str | None:
-    """What is wrong with a try, if anything is."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            attempt.play(attempt.build())
-    except REFUSED as error:
-        message = str(error)
-        if _names(message, attempt.owners) and _names(message, attempt.arguments):
-            return None
-        wanted = f"{attempt.owners} and {attempt.arguments}"
-        return f"{attempt.words}: {type(error).__name__} that does not name {wanted}: {message[:300]}"
-    except BaseException as error:
-        if isinstance(error, KeyboardInterrupt):
-            raise
-        return f"{attempt.words}: {type(error).__name__}: {str(error)[:300]}"
-    return None
-
-
-def _names(message: str, names: tuple[str, ...]) -> bool:
-    return any(re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", message) for name in names)
-
-
-# --- values -----------------------------------------------------------------------------------------------------------
-
-
-def hostile(rng: np.random.Generator) -> Any:
-    """A value that nobody would give on purpose, or hardly."""
-    kind = rng.random()
-    if kind < 0.35:
-        return NUMBERS[int(rng.integers(len(NUMBERS)))]
-    if kind < 0.55:
-        return OTHERS[int(rng.integers(len(OTHERS)))]
-    if kind < 0.75:
-        return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*EXPONENTS[int(rng.integers(len(EXPONENTS)))]))
-    if kind < 0.9:
-        return float(10.0 ** rng.uniform(-9, 9))
-    return int(rng.integers(-10, 1000))
-
-
-def hostile_text(rng: np.random.Generator) -> str:
-    """A text that nobody would write after ``key=``."""
-    if rng.random() < 0.6:
-        return TEXTS[int(rng.integers(len(TEXTS)))]
-    if rng.random() < 0.3:
-        return str(int(rng.integers(-2, 1000)))
-    return repr(float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*EXPONENTS[int(rng.integers(len(EXPONENTS)))])))
-
-
-def _shown(value: object) -> str:
-    try:
-        return repr(value)[:60]
-    except ValueError:
-        return f"a {type(value).__name__}"
+        yield GENERATORS[int(rng.integers(len(GENERATORS)))](rng)
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
@@ -172,16 +87,17 @@ def _parts(rng: np.random.Generator) -> Try:
     chosen = rng.choice(len(parameters), size=min(len(parameters), 1 + int(rng.random() < 0.2)), replace=False)
     keys = [parameters[int(place)].name for place in chosen]
     played = play if _fits(kind, name) else _nothing
+    quick = QUICK.get(name, {}) if kind == "scenario" else {}
     if rng.random() < 0.5:
-        options = {p.name: _example(p) for p in parameters if p.default is p.empty}
+        options = {p.name: _example(p) for p in parameters if p.default is p.empty} | quick
         options |= {key: hostile_text(rng) for key in keys}
         text = f"{name}:" + ",".join(f"{key}={value}" for key, value in options.items())
         named = (*keys, "specification", "member")
         owners = (name, "specification", *_inner(name))
         return Try(f"{kind} {text[:150]!r}", owners, named, lambda: MAKERS[kind](text), played)
-    given = {p.name: _example(p) for p in parameters if p.default is p.empty}
+    given = {p.name: _example(p) for p in parameters if p.default is p.empty} | quick
     given |= {key: hostile(rng) for key in keys}
-    words = f"{kind} {name}({', '.join(f'{key}={_shown(value)}' for key, value in given.items())})"
+    words = f"{kind} {name}({', '.join(f'{key}={shown(value)}' for key, value in given.items())})"
     return Try(words, (name, *_inner(name)), tuple(keys), lambda: factory(**given), played)
 
 
@@ -299,7 +215,7 @@ def _environments(rng: np.random.Generator) -> Try:
         value = 20  # more lanes are only slower
     arguments = {**given, key: value}
     owners = (*_owners(kind), "scenario", "action") if key in ("fidelity", "shadow") else _owners(kind)
-    words = f"{kind.__name__}({', '.join(f'{name}={_shown(item)}' for name, item in arguments.items())})"
+    words = f"{kind.__name__}({', '.join(f'{name}={shown(item)}' for name, item in arguments.items())})"
     return Try(words, owners, (key,), lambda: kind(**arguments), _play_environment)
 
 
@@ -315,7 +231,7 @@ def _resets(rng: np.random.Generator) -> Try:
     if key == "options" and rng.random() < 0.5:
         value = {"reset_mask": value} if rng.random() < 0.5 else {str(value)[:20]: 1}
     kind = ENVIRONMENTS[place][0]
-    words = f"{kind.__name__}.reset({key}={_shown(value)})"
+    words = f"{kind.__name__}.reset({key}={shown(value)})"
     env = _environment(place)
     return Try(words, (*_owners(kind), "options['reset_mask']"), (key,), lambda: env.reset(**{key: value}), _nothing)
 
@@ -340,7 +256,7 @@ def _actions(rng: np.random.Generator) -> Try:
         action = np.zeros(shape, dtype=str(rng.choice(["f8", "i8", "c16", "?", "U3"])))
     else:
         action = value
-    words = f"{ENVIRONMENTS[place][0].__name__}.step({_shown(action)})"
+    words = f"{ENVIRONMENTS[place][0].__name__}.step({shown(action)})"
 
     def play(_: Any) -> None:
         with warnings.catch_warnings():
@@ -373,17 +289,77 @@ OTHER_CALLABLES: tuple[tuple[Callable[..., Any], tuple[str, ...], tuple[str, ...
 def _others(rng: np.random.Generator) -> Try:
     function, owners, keys, play = OTHER_CALLABLES[int(rng.integers(len(OTHER_CALLABLES)))]
     key, value = str(rng.choice(keys)), hostile(rng)
-    words = f"{owners[0]}({key}={_shown(value)})"
+    words = f"{owners[0]}({key}={shown(value)})"
     return Try(words, (*owners, "slices of runs"), (key,), lambda: function(**{key: value}), play)
 
 
-GENERATORS: tuple[Callable[[np.random.Generator], Try], ...] = (
-    _parts, _parts, _parts, _environments, _environments, _resets, _actions, _others,
+CREDIBLE = {"step": 0.1, "samples": 5, "acceleration": 0.5, "auxiliary_sigma": 0.5, "fix_sigma": 0.6, "height_sigma": 1}
+SETTINGS: tuple[tuple[Callable[..., Any], dict[str, Any]], ...] = (
+    (Receiver, {}), (FilterTuning, {}), (Disturbances, {}), (Adaptation, {}), (AuxiliaryRule, {}), (Demands, {}),
+    (Odometer, {}), (CredibleTuning, CREDIBLE), (Straight, {"duration": 1.0}), (Turn, {"angle": 1.0, "duration": 1.0}),
+    (Climb, {"height_change": 1.0, "duration": 1.0}), (Accelerate, {"speed_change": 1.0, "duration": 1.0}),
+    (grade, {"name": "fog"}), (replace, {"obj": grade("fog")}),
 )  # fmt: skip
 
 
-def attempts(seed: int, tries: int) -> Iterator[Try]:
-    """The tries of ``fuzz``, one by one."""
-    rng = np.random.default_rng(seed)
-    for _ in range(tries):
-        yield GENERATORS[int(rng.integers(len(GENERATORS)))](rng)
+def _settings(rng: np.random.Generator) -> Try:
+    """Frozen settings of sensors, filters and trajectories."""
+    make, given = SETTINGS[int(rng.integers(len(SETTINGS)))]
+    if make is replace:
+        keys = [item.name for item in fields(given["obj"]) if item.name != "name"]
+    else:
+        keys = list(inspect.signature(make).parameters)
+    key, value = str(rng.choice(keys)), hostile(rng)
+    if rng.random() < 0.3:
+        value = (value,) * int(rng.choice([2, 3, 6]))
+    words = f"{make.__name__}({key}={shown(value)})"
+    arguments = {**given, key: value}
+    return Try(words, ("must", "needs", "unknown"), (key, "grade"), lambda: _make(make, arguments), _nothing)
+
+
+def _make(make: Callable[..., Any], given: dict[str, Any]) -> Any:
+    given = dict(given)
+    return replace(given.pop("obj"), **given) if make is replace else make(**given)
+
+
+OF_MODELS = tuple(
+    (function, tuple(key for key in inspect.signature(function).parameters if key not in ("model", "tests", "offsets")))
+    for function in (
+        optimum.best_budget, optimum.best_ramp, optimum.bounded_optimum, optimum.cumulative_optimum,
+        optimum.dynamic_programme, optimum.noncentrality_optimum, optimum.upper_bound, optimum.ewma,
+        optimum.window_mean, optimum.missed_magnitude, optimum.expected_play, optimum.zero_alarm,
+    )
+)  # fmt: skip
+GOOD = {"threshold": 25.9, "num_epochs": 3, "budget": 1.0, "drag_off_rate": 1.0, "n": 3, "limit": 3.0, "degrees": 9}
+
+
+def _optima(rng: np.random.Generator) -> Try:
+    """Numbers of the optimum's functions, on a model of a few epochs."""
+    function, keys = OF_MODELS[int(rng.integers(len(OF_MODELS)))]
+    key, value = str(rng.choice(keys)), hostile(rng)
+    parameters = inspect.signature(function).parameters
+    given = {name: GOOD.get(name, 0.5) for name, p in parameters.items() if p.default is p.empty}
+    model = make_scenario(LOOSE).linear_model()
+    for name, thing in (("model", model), ("offsets", np.zeros((12, 3))), ("tests", optimum.gate(3.0))):
+        if name in parameters:
+            given[name] = thing
+    given[key] = value
+    words = f"optimum.{function.__name__}({key}={shown(value)})"
+    return Try(words, (*OF_OPTIMA, function.__name__), (key,), lambda: _found(function, given), _nothing)
+
+
+def _found(function: Callable[..., Any], given: dict[str, Any]) -> Any:
+    """What an optimum finds; that it finds nothing is documented as a RuntimeError."""
+    try:
+        return function(**given)
+    except RuntimeError:
+        return None
+
+
+OF_OPTIMA = ("snapshot test", "cumulative test", "optimum", "linear test", "must")
+
+
+GENERATORS: tuple[Callable[[np.random.Generator], Try], ...] = (
+    _parts, _parts, _parts, _environments, _environments, _resets, _actions, _others, _optima,
+    _settings,
+)  # fmt: skip
