@@ -150,7 +150,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--guards", nargs="+", choices=GUARDS, metavar="GUARD", default=list(GUARDS),
                         help=f"of the adaptation: {', '.join(GUARDS)} (default: every one)")
     options = parser.parse_args(arguments)
-    validation.runs("self_tuning", "runs", options.runs)
     for noise in NOISES:
         print(f"noise {noise}, w = {options.window}, {options.rate:g} m/s, {options.runs} runs\n")
         print(
