@@ -56,4 +56,4 @@ def test_the_command_prints_a_row_per_response_and_draws(capsys, tmp_path):
 def test_no_runs_are_refused(capsys):
     with pytest.raises(SystemExit):
         main(["--runs", "0"])
-    assert "num_runs must be 1 or more" in capsys.readouterr().err
+    assert "num_runs must be a whole number, 1 or more" in capsys.readouterr().err
