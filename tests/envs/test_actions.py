@@ -52,7 +52,7 @@ def test_entries_that_are_not_finite(env, value, dtype):
     refused(env, with_entry(env, value, dtype))
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: type(value).__name__)
 def test_what_is_no_array_of_numbers(env, value):
     refused(env, value)
     if value is not True:  # a list of zeros and True is one of numbers

@@ -420,7 +420,7 @@ def test_tuning_ranks_the_grid(tmp_path, monkeypatch, capsys):
         (defender, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: "),
         (defender, ["--detector", "snapshot", "--attacks", "rain"], "unknown attack 'rain'; valid names: "),
         (defender, ["--detector", "snapshot", "--detector", "snapshot"], "each detector can be given once only"),
-        (defender, ["--scenario", "foi-drive:horizon=0"], "horizon must be 1 epoch or more, got 0"),
+        (defender, ["--scenario", "foi-drive:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
         (defender, ["--resume", "--out", "nowhere"], "nowhere holds no run to resume: it has no config.json"),
         (tune, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: "),
     ],

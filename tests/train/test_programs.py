@@ -128,7 +128,7 @@ def test_interruption_leaves_a_usable_policy(tmp_path):
         (spoofer, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: foi-drive, kujur-flight, liu-flight"),
         (spoofer, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: acceleration, acna, aime"),
         (spoofer, ["--knowledge", "blind", "--action", "innovation"], "knowledge must be 'shadow' or 'full'"),
-        (evaluate, ["--scenario", "liu-flight:horizon=0"], "horizon must be 1 epoch or more, got 0"),
+        (evaluate, ["--scenario", "liu-flight:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
         (evaluate, ["--attack", "ramp:-1"], "rate must be a finite number, 0 or more"),
         (evaluate, ["--attack", "ramp:1,onset=5000"], "lies outside the game"),
         (evaluate, ["--attacker", "nowhere"], "is no run folder"),
