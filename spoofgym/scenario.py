@@ -190,13 +190,19 @@ class Scenario(Immutable, ABC):
             raise ValueError(f"scenario {self.name!r} has no fidelity {shown(fidelity)}; valid fidelities: {valid}")
 
 
-def check_game(owner: str, timeline: Timeline, trajectory: Trajectory) -> None:
+def check_game(owner: str, onset: float, interval: float, horizon: int, trajectory: Trajectory) -> None:
     """Refuse a game that does not fit its trajectory.
+
+    Args:
+        owner: whose game, for the message.
+        onset: time of epoch 0, s.
+        interval: time between epochs, s.
+        horizon: epochs of the game.
+        trajectory: on which it is played.
 
     Raises:
         ValueError: no epochs, a game outside the trajectory, or an onset between two epochs.
     """
-    interval, horizon, onset = timeline.interval, timeline.num_epochs, timeline.start
     if horizon < 1:
         raise ValueError(f"{owner}: horizon must be 1 epoch or more, got {horizon}")
     first, last = 2 * interval, trajectory.time[-1] - horizon * interval
@@ -252,8 +258,8 @@ class SimulatedScenario(Scenario):
     def __post_init__(self) -> None:
         with validation.argument(f"scenario {self.name!r}", "receiver"):
             self.receiver.samples_per_fix(self.trajectory.rate)
-        check_game(f"scenario {self.name!r}", self.timeline, self.trajectory)
         owner = f"scenario {self.name!r}"
+        check_game(owner, self.onset, self.receiver.interval, self.horizon, self.trajectory)
         for rate in validation.triple(owner, "drag_off_rate", self.drag_off_rate):
             validation.above(owner, "drag_off_rate", rate)
         validation.above(owner, "error_scale", self.error_scale)

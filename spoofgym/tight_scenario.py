@@ -93,7 +93,7 @@ class TightScenario(Scenario):
     offers = (INERTIAL_SOLUTION, RANGES)
 
     def __post_init__(self) -> None:
-        check_game(f"scenario {self.name!r}", self.timeline, self.trajectory)
+        check_game(f"scenario {self.name!r}", self.onset, 1.0 / self.rate, self.horizon, self.trajectory)
         if self.observable not in OBSERVABLES:
             raise ValueError(f"observable must be one of {', '.join(OBSERVABLES)}, got {self.observable!r}")
 

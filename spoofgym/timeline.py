@@ -40,6 +40,16 @@ class Timeline:
         """
         return cls(np.asarray(start + interval * np.arange(num_epochs + 1), dtype=np.float64), interval)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether both have the same epochs."""
+        if not isinstance(other, Timeline):
+            return NotImplemented
+        return self.interval == other.interval and np.array_equal(self.times, other.times)
+
+    def __hash__(self) -> int:
+        """Equal for equal timelines."""
+        return hash((self.interval, self.times.tobytes()))
+
     @property
     def num_epochs(self) -> int:
         """K, the epochs of the game after epoch 0."""

@@ -11,6 +11,8 @@ import pytest
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # the width of the terminal in which the tests run, which workers inherit, is not the width that a test means
+    os.environ.pop("COLUMNS", None)
     # a worker of xdist inherits the folders of the process that started it
     if not hasattr(config, "workerinput"):
         folder = _in_the_test_cache(config) or _temporary(config)

@@ -62,7 +62,7 @@ def _member(text: str, arl0: float) -> Detector:
         return make_detector(at_arl0(unnest(text), arl0))
     except ValueError as error:
         raise ValueError(
-            f"ensemble: member {validation.shown(text)}: {error} (within a member '/' stands for ',' and '~' for '+')"
+            f"ensemble: members: {validation.shown(text)}: {error} (within a member '/' stands for ',' and '~' for '+')"
         ) from error
 
 

@@ -37,7 +37,7 @@ def cpi_threshold(p_fa: float, num_epochs: int) -> float:
         ValueError: a value is out of range.
     """
     validation.probability(OWNER, "p_fa", p_fa)
-    return quantile(p_fa, validation.epochs(OWNER, "num_epochs", num_epochs))
+    return quantile(p_fa, validation.whole(OWNER, "num_epochs", num_epochs, 1))
 
 
 def ci_threshold(p_fa: float, num_epochs: int, num_measurements: int) -> float:
@@ -49,7 +49,7 @@ def ci_threshold(p_fa: float, num_epochs: int, num_measurements: int) -> float:
         ValueError: a value is out of range.
     """
     num_measurements = validation.epochs(OWNER, "num_measurements", num_measurements)
-    return cpi_threshold(p_fa, validation.epochs(OWNER, "num_epochs", num_epochs) * num_measurements)
+    return cpi_threshold(p_fa, validation.whole(OWNER, "num_epochs", num_epochs, 1) * num_measurements)
 
 
 def position_information(design: Floats, innovation_covariance: Floats) -> Floats:
@@ -122,7 +122,7 @@ def missed_detection_gaussian(p_fa: float, num_epochs: int, kappa: Floats | floa
         ValueError: a value is out of range.
     """
     threshold = -special.ndtri(validation.probability(OWNER, "p_fa", p_fa))
-    shift = np.sqrt(0.5 * validation.epochs(OWNER, "num_epochs", num_epochs)) * np.asarray(kappa)
+    shift = np.sqrt(0.5 * validation.whole(OWNER, "num_epochs", num_epochs, 1)) * np.asarray(kappa)
     return special.ndtr((threshold - shift) / (1.0 + np.asarray(kappa)))
 
 

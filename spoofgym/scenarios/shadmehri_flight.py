@@ -96,7 +96,7 @@ def shadmehri_flight(
     window = default.window if window is None else validation.epochs(owner, "window", window)
     guard = default.guard if guard is None else validation.text(owner, "guard", guard)
     first = 2.0 / rate
-    start = first if onset is None else validation.above(owner, "onset", onset)
+    start = first if onset is None else validation.between(owner, "onset", onset, first, DURATION - 1.0 / rate)
     return SimulatedScenario(
         name=spell(
             owner,

@@ -140,7 +140,7 @@ def test_a_detection_takes_the_seconds_that_it_takes(whole: Path, silent: Path) 
 def test_a_spoofer_moves_so_many_metres_in_a_second(silent: Path) -> None:
     scenario = recorded(str(silent), onset=ONSET)
     config = SpooferConfig(
-        scenario=scenario, knowledge="blind", fidelity="strapdown", detector="snapshot:threshold=1e12", on_alarm="end"
+        scenario=scenario, knowledge="blind", fidelity="strapdown", detector="snapshot:threshold=1e9", on_alarm="end"
     )
     game = SpooferGame(config, 2)
     game.reset(np.arange(2))

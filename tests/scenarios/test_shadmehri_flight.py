@@ -102,8 +102,9 @@ def test_a_self_tuning_filter_is_built_in_both_fidelities_with_the_common_filter
         ("filter=self-tuning,window=0", "window must be a whole number"),
         ("speed=0", "speed must be a finite number greater than 0"),
         ("rate=3", "must divide the IMU's 160 Hz"),
-        ("onset=0.1", "does not fit the trajectory of 30 s"),
-        ("onset=30", "horizon must be 1 epoch or more"),
+        ("onset=0.1", "onset must be a finite number greater than 0, from 0.2 to 29.9, got 0.1"),
+        ("onset=30", "onset must be a finite number greater than 0, from 0.2 to 29.9, got 30.0"),
+        ("onset=888", "onset must be a finite number greater than 0, from 0.2 to 29.9, got 888.0"),
     ],
 )
 def test_wrong_options_are_refused(options, message):
