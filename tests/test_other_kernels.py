@@ -14,7 +14,7 @@ print(json.dumps([numba.config.CPU_NAME, cpu_target.target_context.codegen().mag
 
 
 def test_other_code_is_chosen_without_a_warning():
-    environment = {**os.environ, **other_kernels()}
+    environment = {**other_kernels(), **os.environ}  # as `main` does: what is set stays
     command = [sys.executable, "-W", "error", "-c", SEEN]
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +22,7 @@ from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
 from spoofgym.evaluation.report import attacker_row
 from spoofgym.optimum import expected_play
 from spoofgym.scenario import Scenario
+from spoofgym.simulation import Simulation
 from train.trained_on import tell_what_is_new
 
 
@@ -51,6 +53,7 @@ class Evaluation:
     def rows(self, policies: list[LearnedSpoofer], attacks: list[Attack], console: Console) -> list[dict[str, Any]]:
         """Rows of the baselines, of scripted attacks and of policies, in this order."""
         self.check_layouts(policies)
+        self.check_attacks(attacks)
         with console.status("baselines"):
             baselines = self._baselines()
         optimum = next((baseline.exact for baseline in baselines if baseline.name == "optimum"), None)
@@ -65,6 +68,15 @@ class Evaluation:
                 exact = self.exact(policy)
             rows.append(attacker_row(policy.name, policy.config.knowledge, score, exact, optimum))
         return rows
+
+    def check_attacks(self, attacks: list[Attack]) -> None:
+        """Refuse attacks that do not fit the game, before anything is played.
+
+        Raises:
+            ValueError: what `Simulation` refuses.
+        """
+        for attack in attacks:
+            Simulation(self.scenario, deepcopy(attack), self.detectors, fidelity=self.fidelity)
 
     def check_layouts(self, policies: list[LearnedSpoofer]) -> None:
         """Refuse policies that were trained for another observation, and tell which play something else.
