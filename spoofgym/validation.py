@@ -232,10 +232,12 @@ def floats(owner: str, name: str, values: Any) -> Floats:
 def real_array(values: Any) -> np.ndarray | None:
     """The values as an array of real numbers as they are; None where they are no such array.
 
-    Text, truth values, complex numbers and objects are no real numbers.
+    Text, truth values, complex numbers, objects and masked numbers are no real numbers.
     """
-    if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+    if type(values) is np.ndarray and values.dtype.kind == "f":
         return values
+    if np.ma.is_masked(values):
+        return None
     try:
         array = np.asarray(values)
     except (TypeError, ValueError, OverflowError, RuntimeError):
@@ -378,6 +380,7 @@ def shown(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of thousands of digits has no text, nor has a list within itself
         text = f"a {type(value).__name__} too long to show"
+    text = " ".join(text.split())  # a table of numbers takes one line, too
     return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}..."
 
 

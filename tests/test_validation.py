@@ -98,6 +98,7 @@ def test_numbers_in_messages_keep_their_digits():
 def test_long_values_are_cut_in_messages():
     assert len(validation.shown("x" * 10_000)) < 120
     assert "int" in validation.shown(10**5000)
+    assert validation.shown(np.zeros((2, 2))) == "array([[0., 0.], [0., 0.]])"
 
 
 def test_an_argument_is_put_before_what_its_parts_refuse():

@@ -107,7 +107,7 @@ class DefenderGame:
             detectors = calibrated_all(detectors, scenario)
         names = [detector.name for detector in detectors]
         if len(set(names)) < len(names):
-            raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
+            raise ValueError(f"{OWNER}: detectors: each detector can be given once only, got {', '.join(names)}")
         running = [deepcopy(detector) for detector in beside] or detectors
         missing = set(names) - {detector.name for detector in running}
         if missing:

@@ -98,7 +98,7 @@ class SpooferGame:
             detectors: Sequence[Detector] = [calibrated(deepcopy(make_detector(part)), scenario) for part in given]
         names = [detector.name for detector in detectors]
         if len(set(names)) < len(names):
-            raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
+            raise ValueError(f"{OWNER}: detector: each detector can be given once only, got {', '.join(names)}")
         dimension = 3 if self._ranges else scenario.dimension
         fields = spoofer_fields(config.knowledge, dimension, tuple(names), self._ranges)
         self.fields = stacked_fields(fields, config.frames)

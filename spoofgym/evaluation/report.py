@@ -60,7 +60,7 @@ def attacker_row(
             "error_at_detection_m": score.error_at_detection,
         }
     achieved = exact if exact is not None else row["mean_undetected_error_m"]
-    if optimum is not None and achieved is not None:
+    if optimum and achieved is not None:  # where the optimum is nothing there is no fraction of it
         row["fraction_of_optimum"] = achieved / optimum
     return row
 

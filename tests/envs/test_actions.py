@@ -52,6 +52,10 @@ def test_entries_that_are_not_finite(env, value, dtype):
     refused(env, with_entry(env, value, dtype))
 
 
+def test_masked_numbers(env):
+    refused(env, np.ma.masked_all(env.action_space.shape))
+
+
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: type(value).__name__)
 def test_what_is_no_array_of_numbers(env, value):
     refused(env, value)
