@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.validation import LATEST
 
 LARGEST = 2**28
 """Bytes of text in a table at most, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that
@@ -22,6 +23,9 @@ LONGEST_LINE = 100_000
 """Characters of a line at most: some thousand columns."""
 SHOWN = 200
 """Characters of a file that a message quotes at most."""
+
+TIMES = (-LATEST, LATEST)
+"""Valid values of a time, s."""
 
 Limits = Mapping[str, tuple[float, float]]
 """Valid values, inclusive, of columns that have bounds."""
