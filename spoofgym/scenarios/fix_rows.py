@@ -6,6 +6,7 @@ fix may lie where no vehicle can have been. Such rows are left out; from the log
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -35,15 +36,28 @@ FASTEST = 3.0
 AROUND = 21
 WILD = 3
 """Fixes in a row that are left out at most: what stays away longer may be true, or the attack that is in the log."""
+WILD_TIME = 3.0
+"""Time over which rows of a reference are left out at most, s, and `WILD` rows where that is more."""
 
 
-def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dict[str, Floats], Runs]:
+def most_wild(time: Floats) -> int:
+    """Rows of a reference that are left out in a row at most: those of `WILD_TIME`, or `WILD`.
+
+    Args:
+        time: of the rows, (n,), s.
+    """
+    interval = float(np.median(np.diff(time)))
+    return max(WILD, math.ceil(min(WILD_TIME / interval, len(time)))) if interval > 0.0 else WILD
+
+
+def usable_rows(path: Path, table: dict[str, Floats], start: float, most: int = WILD) -> tuple[dict[str, Floats], Runs]:
     """The rows of a table that are fixes.
 
     Args:
         path: of the table, for messages.
         table: its columns, each (n,).
         start: of the log, on the clock of the table, s.
+        most: rows in a row that are left out at most because they are out of reach.
 
     Returns:
         The columns, (k,) each, and the lines of the file that they come from, (k,).
@@ -54,12 +68,15 @@ def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dic
     told = table["t_s"] >= start
     no_position = _no_position(table["lat_deg"], table["lon_deg"])
     _tell(path, no_position & told, "have lat_deg = lon_deg = 0, no fix, and are left out")
+    half = _half_a_position(table["lat_deg"], table["lon_deg"]) & ~no_position
+    _tell(path, half & told, "have lat_deg = 0 or lon_deg = 0 far from the others, no fix, and are left out")
+    no_position |= half
     no_fix = _no_fix(table) & ~no_position
     _tell(path, no_fix & told, f"have a horizontal sigma of {UNKNOWN_SIGMA:g} m or more, no fix, and are left out")
     kept = np.flatnonzero(~no_position & ~no_fix)
     if len(kept) >= 2:
         wild = np.zeros(len(told), dtype=bool)
-        wild[kept] = wild_fixes(table["t_s"][kept], _track(table, kept))
+        wild[kept] = wild_fixes(table["t_s"][kept], _track(table, kept), most)
         rest = kept[~wild[kept]]
         if "vn_mps" in table:
             velocity = np.column_stack([table["ve_mps"], table["vn_mps"], -table["vd_mps"]])[rest]
@@ -84,6 +101,16 @@ def _no_position(latitude: Floats, longitude: Floats) -> Flags:
     others = np.abs(np.column_stack([latitude, longitude])[~zero])
     near = len(others) > 0 and bool(np.all(np.median(others, axis=0) < NEAR_ZERO))
     return np.zeros(len(zero), dtype=bool) if near else zero
+
+
+def _half_a_position(latitude: Floats, longitude: Floats) -> Flags:
+    """Rows of which one of the two is zero, degrees, unless the vehicle came near to where that holds."""
+    result = np.zeros(len(latitude), dtype=bool)
+    for values in (latitude, longitude):
+        others = np.abs(values[values != 0.0])
+        if len(others) and others.min() >= NEAR_ZERO:
+            result |= values == 0.0
+    return result
 
 
 def _no_fix(table: dict[str, Floats]) -> Flags:
@@ -131,12 +158,13 @@ def known_sigmas(path: Path, rows: dict[str, Floats], lines: Runs, start: float)
     return result
 
 
-def wild_fixes(time: Floats, track: Floats) -> Flags:
-    """Fixes that are out of reach from the one before, where the track goes on from there up to `WILD` fixes later.
+def wild_fixes(time: Floats, track: Floats, most: int = WILD) -> Flags:
+    """Fixes that are out of reach from the one before, where the track goes on from there up to ``most`` fixes later.
 
     Args:
         time: (n,), s, not decreasing.
         track: positions, (n, 3), m ENU.
+        most: fixes in a row that are left out at most.
 
     Returns:
         (n,).
@@ -154,12 +182,12 @@ def wild_fixes(time: Floats, track: Floats) -> Flags:
     for place in (np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1).tolist():
         if place <= handled:
             continue
-        returns = (other for other in range(place + 1, min(place + WILD + 1, number)) if reached(place - 1, other))
+        returns = (other for other in range(place + 1, min(place + most + 1, number)) if reached(place - 1, other))
         if (back := next(returns, None)) is not None:
             wild[place:back], handled = True, back
-        elif place <= WILD < number - place:
+        elif place <= most < number - place:
             wild[:place] = True
-        elif number - place <= WILD < place:
+        elif number - place <= most < place:
             wild[place:], handled = True, number
     return wild
 

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.scenarios.fix_rows import known_sigmas, usable_rows
+from spoofgym.scenarios.fix_rows import known_sigmas, most_wild, usable_rows
 from spoofgym.scenarios.mounting import find_delay, find_mounting
 from spoofgym.scenarios.notes import ENU_OF_NED, Notes
 from spoofgym.scenarios.table import TIMES, check_increasing, has_table, read_table, seconds, table_path
@@ -229,9 +229,9 @@ def _read_fixes(path: Path, start: float, delay: float) -> Fixes:
 def _read_reference(path: Path, start: float) -> Fixes:
     """Its sigmas only tell which rows are no position."""
     table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS], LIMITS)
-    rows, lines = usable_rows(path, table, start)
+    rows, lines = usable_rows(path, table, start, most_wild(table["t_s"]))
     check_increasing(path, rows["t_s"], lines)
-    return replace(_fixes(rows, 0.0), position_sigma=None)
+    return replace(_fixes(rows, 0.0), position_sigma=None, lines=lines)
 
 
 def _fixes(rows: dict[str, Floats], delay: float) -> Fixes:

@@ -34,7 +34,7 @@ from spoofgym.scenarios.range_epochs import range_epochs
 from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
-from spoofgym.scenarios.reference import check_reference
+from spoofgym.scenarios.reference import checked_reference
 from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
@@ -211,11 +211,11 @@ def recorded(
     if coupling == "tight":
         epochs = range_epochs(log)
         log = replace(log, fixes=epochs.fixes, lever_arm=_no_arm(log))
-        check_reference(log)
+        log = checked_reference(log)
         return RecordedRanges(name=name, log=log, grade=imu, tuning=tuning, epochs=epochs, onset=onset, horizon=horizon)
     if fixes == "ranges":
         log = replace(log, fixes=range_fixes(log))
-    check_reference(log)
+    log = checked_reference(log)
     log = with_velocity_at_imu(log)
     if velocity is False or (velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
