@@ -7,6 +7,7 @@ fix may lie where no vehicle can have been. Such rows are left out; from the log
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -140,21 +141,23 @@ def known_sigmas(path: Path, rows: dict[str, Floats], lines: Runs, start: float)
     """
     default = dict(zip(COLUMNS, DEFAULT_SIGMA, strict=True))
     zero = {name: rows[name] == 0.0 for name in COLUMNS if name in rows}
-    any_zero = np.logical_or.reduce([np.zeros(len(lines), dtype=bool), *zero.values()])
-    told = np.flatnonzero(any_zero & (rows["t_s"] >= start))
-    if len(told):
-        which = [name for name, column in zero.items() if column[told].any()]
-        line = int(lines[told[0]])
-        warn(
-            path.parent,
-            f"{path.name}: {len(told)} of {len(lines)} rows have a sigma of 0 ({', '.join(which)}), which is taken as "
-            f"unknown: {', '.join(f'{default[name]:g}' for name in which)}; the first is line {line}",
-            line,
-        )
+    large = {name: rows[name] >= UNKNOWN_SIGMA for name in zero}
+    after = rows["t_s"] >= start
+
+    def tell(columns: dict[str, Flags], what: str, meaning: Callable[[list[str]], str]) -> None:
+        told = np.flatnonzero(after & np.logical_or.reduce([np.zeros(len(lines), dtype=bool), *columns.values()]))
+        if len(told):
+            which = [name for name, column in columns.items() if column[told].any()]
+            line = int(lines[told[0]])
+            text = f"{len(told)} of {len(lines)} rows have a sigma of {what} ({', '.join(which)}), which is taken as "
+            warn(path.parent, f"{path.name}: {text}{meaning(which)}; the first is line {line}", line)
+
+    tell(zero, "0", lambda which: f"unknown: {', '.join(f'{default[name]:g}' for name in which)}")
+    tell(large, f"{UNKNOWN_SIGMA:g} or more", lambda which: "not measured")
     result = dict(rows)
     for name, unknown in zero.items():
         result[name] = np.where(unknown, default[name], rows[name])
-        result[name][rows[name] >= UNKNOWN_SIGMA] = UNMEASURED_SIGMA
+        result[name][large[name]] = UNMEASURED_SIGMA
     return result
 
 
