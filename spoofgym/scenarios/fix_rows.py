@@ -29,6 +29,8 @@ NEAR_ZERO = 0.1
 """Latitude and longitude of a log at latitude 0 and longitude 0, degrees."""
 FARTHEST = 50.0
 """Error that a fix may have, m, beside the way that the vehicle may have gone."""
+LEAP_BACK = 25.0
+"""Least step by which a track comes back from fixes out of reach, m: without one it has gone on from them."""
 CONTRADICTION = 50.0
 """Difference that a velocity may have from the mean one before it and after it, m/s; over less than a second by as much
 more as the positions tell less."""
@@ -179,7 +181,8 @@ def wild_fixes(time: Floats, track: Floats, most: int = WILD) -> Flags:
 
     def reached(one: int, other: int) -> bool:
         way = float(np.linalg.norm(track[other] - track[one]))
-        return way <= max(speed[one], speed[other - 1]) * (time[other] - time[one]) + FARTHEST
+        near = way <= max(speed[one], speed[other - 1]) * (time[other] - time[one]) + FARTHEST
+        return bool(near and step[other - 1] > LEAP_BACK)
 
     handled = 0
     for place in (np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1).tolist():

@@ -122,6 +122,16 @@ def test_an_attack_that_jumps_and_stays_is_kept() -> None:
         assert not wild_fixes(time, track).any()
 
 
+def test_a_track_that_leaps_once_has_no_wild_fix() -> None:
+    """At 5 Hz the vehicle could have gone that far soon; where the leap goes is the track, whatever came before it."""
+    time = 0.2 * np.arange(200)
+    track = np.column_stack([np.zeros(200), 12.0 * time, np.zeros(200)])
+    track[100:, 0] += 65.0
+    assert not wild_fixes(time, track, 15).any()
+    track[108:, 0] -= 65.0
+    np.testing.assert_array_equal(np.flatnonzero(wild_fixes(time, track, 15)), np.arange(100, 108))
+
+
 def test_a_vehicle_that_stands_longer_than_it_drives_is_no_wild_one() -> None:
     """Its median speed is zero; fast straight flight, holes in the fixes and a turn back are still believed."""
     time = np.concatenate([np.arange(60.0), np.arange(70.0, 100.0)])
