@@ -134,7 +134,9 @@ def kujur_flight(
     )
 
 
-def _loose(name: str, trajectory: Trajectory, horizon: int, onset: float, hour: float, imu: str) -> SimulatedScenario:
+def _loose(
+    name: str, trajectory: Trajectory, horizon: int, onset: float, hour: float, imu: str
+) -> SimulatedScenario:
     ranges = range_fix_along(KUJUR, gps_24(), trajectory, RATE, 3600.0 * hour, MASK)
     east, north, up = np.sqrt(np.diag(ranges.covariance(round(onset * RATE) - 1))).tolist()
     return SimulatedScenario(

@@ -122,7 +122,9 @@ def test_where_satellites_are_too_few_for_a_fix_their_ranges_show_the_step(tmp_p
     rows = [line.split(",") for line in lines[1:]]
     times = sorted({float(row[1]) for row in rows})
     seen = sorted({row[0] for row in rows})[:3]
-    kept = [",".join(row) for row in rows if not times[70] <= float(row[1]) < times[80] or row[0] in seen]
+    kept = [
+        ",".join(row) for row in rows if not times[70] <= float(row[1]) < times[80] or row[0] in seen
+    ]
     folder.joinpath("ranges.csv").write_text("\n".join([lines[0], *kept]) + "\n")
     steps = find_steps(solve_ranges(read_ranges(folder), START))
     np.testing.assert_array_equal(np.flatnonzero(np.diff(steps.offset)) + 1, [75])

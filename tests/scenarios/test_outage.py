@@ -154,12 +154,7 @@ def test_what_a_defender_sees_of_time(silent: Path) -> None:
     """Coasting time and acceleration before, across and after the outage, every fix used."""
     scenario = recorded(str(silent), onset=BEGIN - 3.0)
     config = DefenderConfig(
-        scenario=scenario,
-        fidelity="strapdown",
-        detectors=("snapshot",),
-        attacks="ramp:0.1",
-        clean=1.0,
-        outage=0.0,
+        scenario=scenario, fidelity="strapdown", detectors=("snapshot",), attacks="ramp:0.1", clean=1.0, outage=0.0,
         multipath=0.0,
     )
     game = DefenderGame(config, 1)

@@ -44,12 +44,16 @@ def straight():
 def rotated(vectors, angle):
     """Clockwise, as yaw turns."""
     east, north = vectors.T
-    return np.column_stack([east * np.cos(angle) + north * np.sin(angle), north * np.cos(angle) - east * np.sin(angle)])
+    return np.column_stack(
+        [east * np.cos(angle) + north * np.sin(angle), north * np.cos(angle) - east * np.sin(angle)]
+    )
 
 
 def test_a_turn_of_the_wheel_is_its_circumference():
     odometer = Odometer()
-    assert wheel_travel(np.array([495.0, -990.0]), odometer) == pytest.approx([2 * np.pi * 0.0325, -4 * np.pi * 0.0325])
+    assert wheel_travel(np.array([495.0, -990.0]), odometer) == pytest.approx(
+        [2 * np.pi * 0.0325, -4 * np.pi * 0.0325]
+    )
 
 
 def test_counts_never_lose_more_than_one_mark():
