@@ -6,6 +6,8 @@ fix may lie where no vehicle can have been. Such rows are left out; from the log
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,8 @@ NEAR_ZERO = 0.1
 """Latitude and longitude of a log at latitude 0 and longitude 0, degrees."""
 FARTHEST = 50.0
 """Error that a fix may have, m, beside the way that the vehicle may have gone."""
+LEAP_BACK = 25.0
+"""Least step by which a track comes back from fixes out of reach, m: without one it has gone on from them."""
 CONTRADICTION = 50.0
 """Difference that a velocity may have from the mean one before it and after it, m/s; over less than a second by as much
 more as the positions tell less."""
@@ -35,15 +39,28 @@ FASTEST = 3.0
 AROUND = 21
 WILD = 3
 """Fixes in a row that are left out at most: what stays away longer may be true, or the attack that is in the log."""
+WILD_TIME = 3.0
+"""Time over which rows of a reference are left out at most, s, and `WILD` rows where that is more."""
 
 
-def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dict[str, Floats], Runs]:
+def most_wild(time: Floats) -> int:
+    """Rows of a reference that are left out in a row at most: those of `WILD_TIME`, or `WILD`.
+
+    Args:
+        time: of the rows, (n,), s.
+    """
+    interval = float(np.median(np.diff(time)))
+    return max(WILD, math.ceil(min(WILD_TIME / interval, len(time)))) if interval > 0.0 else WILD
+
+
+def usable_rows(path: Path, table: dict[str, Floats], start: float, most: int = WILD) -> tuple[dict[str, Floats], Runs]:
     """The rows of a table that are fixes.
 
     Args:
         path: of the table, for messages.
         table: its columns, each (n,).
         start: of the log, on the clock of the table, s.
+        most: rows in a row that are left out at most because they are out of reach.
 
     Returns:
         The columns, (k,) each, and the lines of the file that they come from, (k,).
@@ -54,12 +71,15 @@ def usable_rows(path: Path, table: dict[str, Floats], start: float) -> tuple[dic
     told = table["t_s"] >= start
     no_position = _no_position(table["lat_deg"], table["lon_deg"])
     _tell(path, no_position & told, "have lat_deg = lon_deg = 0, no fix, and are left out")
+    half = _half_a_position(table["lat_deg"], table["lon_deg"]) & ~no_position
+    _tell(path, half & told, "have lat_deg = 0 or lon_deg = 0 far from the others, no fix, and are left out")
+    no_position |= half
     no_fix = _no_fix(table) & ~no_position
     _tell(path, no_fix & told, f"have a horizontal sigma of {UNKNOWN_SIGMA:g} m or more, no fix, and are left out")
     kept = np.flatnonzero(~no_position & ~no_fix)
     if len(kept) >= 2:
         wild = np.zeros(len(told), dtype=bool)
-        wild[kept] = wild_fixes(table["t_s"][kept], _track(table, kept))
+        wild[kept] = wild_fixes(table["t_s"][kept], _track(table, kept), most)
         rest = kept[~wild[kept]]
         if "vn_mps" in table:
             velocity = np.column_stack([table["ve_mps"], table["vn_mps"], -table["vd_mps"]])[rest]
@@ -84,6 +104,16 @@ def _no_position(latitude: Floats, longitude: Floats) -> Flags:
     others = np.abs(np.column_stack([latitude, longitude])[~zero])
     near = len(others) > 0 and bool(np.all(np.median(others, axis=0) < NEAR_ZERO))
     return np.zeros(len(zero), dtype=bool) if near else zero
+
+
+def _half_a_position(latitude: Floats, longitude: Floats) -> Flags:
+    """Rows of which one of the two is zero, degrees, unless the vehicle came near to where that holds."""
+    result = np.zeros(len(latitude), dtype=bool)
+    for values in (latitude, longitude):
+        others = np.abs(values[values != 0.0])
+        if len(others) and others.min() >= NEAR_ZERO:
+            result |= values == 0.0
+    return result
 
 
 def _no_fix(table: dict[str, Floats]) -> Flags:
@@ -113,30 +143,33 @@ def known_sigmas(path: Path, rows: dict[str, Floats], lines: Runs, start: float)
     """
     default = dict(zip(COLUMNS, DEFAULT_SIGMA, strict=True))
     zero = {name: rows[name] == 0.0 for name in COLUMNS if name in rows}
-    any_zero = np.logical_or.reduce([np.zeros(len(lines), dtype=bool), *zero.values()])
-    told = np.flatnonzero(any_zero & (rows["t_s"] >= start))
-    if len(told):
-        which = [name for name, column in zero.items() if column[told].any()]
-        line = int(lines[told[0]])
-        warn(
-            path.parent,
-            f"{path.name}: {len(told)} of {len(lines)} rows have a sigma of 0 ({', '.join(which)}), which is taken as "
-            f"unknown: {', '.join(f'{default[name]:g}' for name in which)}; the first is line {line}",
-            line,
-        )
+    large = {name: rows[name] >= UNKNOWN_SIGMA for name in zero}
+    after = rows["t_s"] >= start
+
+    def tell(columns: dict[str, Flags], what: str, meaning: Callable[[list[str]], str]) -> None:
+        told = np.flatnonzero(after & np.logical_or.reduce([np.zeros(len(lines), dtype=bool), *columns.values()]))
+        if len(told):
+            which = [name for name, column in columns.items() if column[told].any()]
+            line = int(lines[told[0]])
+            text = f"{len(told)} of {len(lines)} rows have a sigma of {what} ({', '.join(which)}), which is taken as "
+            warn(path.parent, f"{path.name}: {text}{meaning(which)}; the first is line {line}", line)
+
+    tell(zero, "0", lambda which: f"unknown: {', '.join(f'{default[name]:g}' for name in which)}")
+    tell(large, f"{UNKNOWN_SIGMA:g} or more", lambda which: "not measured")
     result = dict(rows)
     for name, unknown in zero.items():
         result[name] = np.where(unknown, default[name], rows[name])
-        result[name][rows[name] >= UNKNOWN_SIGMA] = UNMEASURED_SIGMA
+        result[name][large[name]] = UNMEASURED_SIGMA
     return result
 
 
-def wild_fixes(time: Floats, track: Floats) -> Flags:
-    """Fixes that are out of reach from the one before, where the track goes on from there up to `WILD` fixes later.
+def wild_fixes(time: Floats, track: Floats, most: int = WILD) -> Flags:
+    """Fixes that are out of reach from the one before, where the track goes on from there up to ``most`` fixes later.
 
     Args:
         time: (n,), s, not decreasing.
         track: positions, (n, 3), m ENU.
+        most: fixes in a row that are left out at most.
 
     Returns:
         (n,).
@@ -148,18 +181,19 @@ def wild_fixes(time: Floats, track: Floats) -> Flags:
 
     def reached(one: int, other: int) -> bool:
         way = float(np.linalg.norm(track[other] - track[one]))
-        return way <= max(speed[one], speed[other - 1]) * (time[other] - time[one]) + FARTHEST
+        near = way <= max(speed[one], speed[other - 1]) * (time[other] - time[one]) + FARTHEST
+        return bool(near and step[other - 1] > LEAP_BACK)
 
     handled = 0
     for place in (np.flatnonzero(step > speed * np.maximum(duration, 0.0) + FARTHEST) + 1).tolist():
         if place <= handled:
             continue
-        returns = (other for other in range(place + 1, min(place + WILD + 1, number)) if reached(place - 1, other))
+        returns = (other for other in range(place + 1, min(place + most + 1, number)) if reached(place - 1, other))
         if (back := next(returns, None)) is not None:
             wild[place:back], handled = True, back
-        elif place <= WILD < number - place:
+        elif place <= most < number - place:
             wild[:place] = True
-        elif number - place <= WILD < place:
+        elif number - place <= most < place:
             wild[place:], handled = True, number
     return wild
 

@@ -7,4 +7,4 @@ SIGMAS = (1e-3, 1e6)
 SPEEDS = (0.1, 1e4)
 """Of a vehicle, m/s."""
 NOISE_FACTORS = (1e-6, 1e6)
-"""On a filter's process noise."""
+"""On the variance of a filter's process noise."""

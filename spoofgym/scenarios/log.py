@@ -15,10 +15,10 @@ from scipy.interpolate import CubicHermiteSpline
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.scenarios.fix_rows import known_sigmas, usable_rows
+from spoofgym.scenarios.fix_rows import known_sigmas, most_wild, usable_rows
 from spoofgym.scenarios.mounting import find_delay, find_mounting
 from spoofgym.scenarios.notes import ENU_OF_NED, Notes
-from spoofgym.scenarios.table import check_increasing, has_table, read_table, seconds, table_path
+from spoofgym.scenarios.table import TIMES, check_increasing, has_table, read_table, seconds, table_path
 
 IMU_COLUMNS = ("t_s", "gx_radps", "gy_radps", "gz_radps", "ax_mps2", "ay_mps2", "az_mps2")
 POSITION_COLUMNS = ("t_s", "lat_deg", "lon_deg", "h_m")
@@ -28,6 +28,7 @@ VELOCITY_SIGMA_COLUMNS = ("sd_vn_mps", "sd_ve_mps", "sd_vd_mps")
 SIGMA_COLUMNS = (POSITION_SIGMA_COLUMNS, VELOCITY_SIGMA_COLUMNS)
 
 LIMITS = {
+    **{"t_s": TIMES},
     **{"lat_deg": (-89.0, 89.0), "lon_deg": (-360.0, 360.0), "h_m": (-12_000.0, 100_000.0)},
     **{name: (0.0, math.inf) for name in POSITION_SIGMA_COLUMNS + VELOCITY_SIGMA_COLUMNS},
     **{name: (-10_000.0, 10_000.0) for name in VELOCITY_COLUMNS + IMU_COLUMNS[4:]},
@@ -228,9 +229,9 @@ def _read_fixes(path: Path, start: float, delay: float) -> Fixes:
 def _read_reference(path: Path, start: float) -> Fixes:
     """Its sigmas only tell which rows are no position."""
     table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS], LIMITS)
-    rows, lines = usable_rows(path, table, start)
+    rows, lines = usable_rows(path, table, start, most_wild(table["t_s"]))
     check_increasing(path, rows["t_s"], lines)
-    return replace(_fixes(rows, 0.0), position_sigma=None)
+    return replace(_fixes(rows, 0.0), position_sigma=None, lines=lines)
 
 
 def _fixes(rows: dict[str, Floats], delay: float) -> Fixes:

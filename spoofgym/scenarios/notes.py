@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
 
 if sys.version_info >= (3, 11):
@@ -55,7 +56,7 @@ class Notes:
         self.path = path
         self._values = _read(path)
         for key, value in self._values.items():
-            if fault := _table_fault(key, value) if isinstance(value, dict) else _key_fault(key):
+            if fault := _table_fault(key, value) if _tables(value) else _key_fault(key, value):
                 raise ValueError(f"{path}: {fault}; valid are {VALID}")
 
     def __contains__(self, key: str) -> bool:
@@ -77,14 +78,14 @@ class Notes:
         """A time; None as default = it must be there.
 
         Raises:
-            ValueError: it is missing, or no finite number.
+            ValueError: it is missing, no finite number, or larger than a time can be.
         """
         value = self._values.get(key, default)
         if value is None:
             raise ValueError(f"{self.path}: {key} is missing; it must be a finite number of seconds")
         if not _is_number(value):
             raise ValueError(f"{self.path}: {key} must be a finite number of seconds, got {value!r:.100}")
-        return float(value)
+        return validation.time(str(self.path), key, value)
 
     def lever_arm(self) -> Floats:
         """From the IMU to the antenna, body right, forward, up, (3,), m.
@@ -148,25 +149,70 @@ def _read(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path}: not valid TOML: {error}") from None
 
 
-def _key_fault(key: str) -> str | None:
-    """What is wrong with a key of the file; None = nothing."""
-    if key in (*SETTINGS, *REMARKS, NOTES):
+def _tables(value: object) -> list[dict[str, Any]]:
+    """The tables that a value is or, in a list, consists of; empty = it is no table."""
+    tables = value if isinstance(value, list) else [value]
+    return [table for table in tables if isinstance(table, dict)]
+
+
+def _key_fault(key: str, value: object) -> str | None:
+    """What is wrong with a key of the file that is no table; None = nothing."""
+    if key == NOTES:
+        return f"{NOTES} must be a table, got {value!r:.100}"
+    if key in (*SETTINGS, *REMARKS):
         return None
     meant = nearest(key, CLOSE)
     return f"unknown key {key!r}" + ("" if meant is None else f" (did you mean {meant!r}?)")
 
 
-def _table_fault(table: str, content: dict[str, Any]) -> str | None:
-    """What is wrong with a table of the file; None = nothing.
+def _table_fault(table: str, value: object) -> str | None:
+    """What is wrong with a table of the file, or a list of tables; None = nothing.
 
     In TOML whatever follows ``[notes]`` belongs to it: a setting that is added at the end of a file.
     """
-    for key, value in content.items():
-        if not isinstance(value, str) and (meant := nearest(key, SURE)) in SETTINGS:
-            return f"{meant!r} must stand above all tables, got {key!r} in [{table}]"
+    for content in _tables(value):
+        if fault := _misplaced(table, content):
+            return fault
     if table in (*SETTINGS, *REMARKS):
         return f"{table} must not be a table"
-    return None if table == NOTES else f"unknown table [{table}]"
+    if table != NOTES:
+        return f"unknown table [{table}]"
+    return None if isinstance(value, dict) else f"{NOTES} must be one table [{NOTES}], not a list of tables"
+
+
+def _misplaced(table: str, content: dict[str, Any]) -> str | None:
+    """Which setting a table holds, at any depth; None = none."""
+    for key, value in content.items():
+        if meant := _setting(key, value):
+            return f"{meant!r} must stand above all tables, got {key!r} in [{table}]"
+        for inner in _tables(value):
+            if fault := _misplaced(f"{table}.{key}", inner):
+                return fault
+    return None
+
+
+def _setting(key: str, value: object) -> str | None:
+    """The setting that is meant by a key among others that are welcome; None = none.
+
+    Text is a remark, unless the key is a setting's own or the text is a number.
+    """
+    lower = key.lower()
+    remark = isinstance(value, str) and not _is_numeral(value)
+    if remark:
+        return lower if lower in SETTINGS and lower != "name" else None
+    whole = [setting for setting in SETTINGS if "_" in lower and lower in setting]
+    if len(whole) == 1:  # lever_arm, imu_delay
+        return whole[0]
+    meant = nearest(key, SURE)
+    return meant if meant in SETTINGS and not (meant == "name" and isinstance(value, str)) else None
+
+
+def _is_numeral(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def nearest(key: str, similarity: float) -> str | None:

@@ -24,6 +24,8 @@ from spoofgym.sensors.geometry import SatelliteGeometry
 
 UNSTEADY = 0.1
 """Share of the interval between epochs by which one may come early or late."""
+MOST_EMPTY = 20_000
+"""Epochs without ranges in a log at most: 5 hours at 1 Hz, half an hour at 10 Hz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +145,8 @@ def steady(ranges: Ranges, owner: str) -> Ranges:
         owner: where they come from, for the message.
 
     Raises:
-        ValueError: an epoch lies between those of the steady rate, or there are fewer than two.
+        ValueError: an epoch lies between those of the steady rate, there are fewer than two, or more than `MOST_EMPTY`
+            are empty.
     """
     if len(ranges.time) < 2:
         raise ValueError(f"{owner}: ranges of 2 epochs or more are needed, got {len(ranges.time)}")
@@ -156,11 +159,18 @@ def steady(ranges: Ranges, owner: str) -> Ranges:
             f"{owner}: ranges must come at a steady rate: after {seconds(ranges.time[off[0]])} s the next come "
             f"{steps[off[0]] * interval:.4g} s later, with a median of {interval:.4g} s"
         )
+    empty = number.sum() - len(number)
+    if empty > MOST_EMPTY:
+        widest = int(np.argmax(steps))
+        raise ValueError(
+            f"{owner}: ranges.csv leaves out {empty:.4g} epochs of {interval:.4g} s, valid are {MOST_EMPTY} at most: "
+            f"after {seconds(ranges.time[widest])} s the next come at {seconds(ranges.time[widest + 1])} s"
+        )
     place = np.concatenate([[0], np.cumsum(number).astype(np.int64)])
     epochs = place[-1] + 1
 
-    def spread(values: Any, empty: float) -> Any:
-        result = np.full((epochs, values.shape[1]), empty, dtype=values.dtype)
+    def spread(values: Any, nothing: float) -> Any:
+        result = np.full((epochs, values.shape[1]), nothing, dtype=values.dtype)
         result[place] = values
         return result
 

@@ -15,15 +15,22 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.scenarios.table import read_table, seconds, table_path
+from spoofgym.scenarios.table import TIMES, read_table, seconds, table_path
 from spoofgym.sensors.ephemeris import Ephemeris, read_csv, time_between
 from spoofgym.sensors.geometry import SatelliteGeometry, lines_of_sight, received_states
 from spoofgym.sensors.ranging import troposphere_mapping
 
 RANGE_COLUMNS = ("t_s", "svid", "pseudorange_m", "range_rate_mps", "cn0_dbhz")
 RATE_SIGMA_COLUMN = ("rr_std",)
-LIMITS = {"svid": (1.0, math.inf), "cn0_dbhz": (0.0, 100.0), "rr_std": (0.0, math.inf)}
-"""Valid values, inclusive, of columns that have bounds."""
+LIMITS = {
+    "t_s": TIMES,
+    "svid": (1.0, math.inf),
+    "pseudorange_m": (-1e12, 1e12),
+    "range_rate_mps": (-1e6, 1e6),
+    "cn0_dbhz": (0.0, 100.0),
+    "rr_std": (0.0, math.inf),
+}
+"""Valid values, inclusive, of columns with bounds: a receiver's clock may be off by an hour, its rate by 0.3 %."""
 MASK = math.radians(5.0)
 """Elevation below which a satellite is not used, rad: that of DO-229."""
 CODE_SIGMA = 4.0

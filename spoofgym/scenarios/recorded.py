@@ -27,13 +27,14 @@ from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import CleanRun, clean_run
 from spoofgym.scenarios.fix_rows import DEFAULT_SIGMA, UNMEASURED_SIGMA
 from spoofgym.scenarios.lever_arm import with_velocity_at_imu
+from spoofgym.scenarios.limits import NOISE_FACTORS
 from spoofgym.scenarios.log import Log, read_log, velocity_of
 from spoofgym.scenarios.log_warning import warn
 from spoofgym.scenarios.range_epochs import range_epochs
 from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
-from spoofgym.scenarios.reference import check_reference
+from spoofgym.scenarios.reference import checked_reference
 from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
@@ -166,7 +167,7 @@ def recorded(
         horizon: epochs of the game; None = to the end of the log.
         velocity: whether the filter uses the receiver's velocity beside its position; None = where the log has it.
         sigma_floor: smallest 1 sigma of a fix that the filter believes, m and m/s.
-        noise_factor: the filter's white inertial noise over the data sheet's.
+        noise_factor: the filter's white inertial noise over the data sheet's, from 0.001 to 1000.
         fixes: which ones the filter takes: ``phone``, those in the log, whatever receiver made them, or ``ranges``,
             least squares of the log's raw ranges (`range_fixes`).
         coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of the log's raw ranges.
@@ -182,7 +183,7 @@ def recorded(
     if onset is not None:
         onset = validation.time("recorded", "onset", onset)
     sigma_floor = validation.above("recorded", "sigma_floor", sigma_floor)
-    noise_factor = validation.above("recorded", "noise_factor", noise_factor)
+    noise_factor = validation.between("recorded", "noise_factor", noise_factor, *map(math.sqrt, NOISE_FACTORS))
     fixes = validation.one_of("recorded", "fixes", fixes, FIXES)
     coupling = validation.one_of("recorded", "coupling", coupling, COUPLINGS)
     if coupling == "tight" and (velocity is not None or sigma_floor != SIGMA_FLOOR or fixes != FIXES[0]):
@@ -210,13 +211,11 @@ def recorded(
     if coupling == "tight":
         epochs = range_epochs(log)
         log = replace(log, fixes=epochs.fixes, lever_arm=_no_arm(log))
-        check_reference(log)
-        return RecordedRanges(
-            name=name, log=log, grade=imu, tuning=tuning, epochs=epochs, onset=onset, horizon=horizon
-        )
+        log = checked_reference(log)
+        return RecordedRanges(name=name, log=log, grade=imu, tuning=tuning, epochs=epochs, onset=onset, horizon=horizon)
     if fixes == "ranges":
         log = replace(log, fixes=range_fixes(log))
-    check_reference(log)
+    log = checked_reference(log)
     log = with_velocity_at_imu(log)
     if velocity is False or (velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import re
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,14 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.validation import LATEST
 
 LARGEST = 2**28
 """Bytes of text in a table at most, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that
 unpacks to more is not read on."""
 MOST_LINES = 10_000_000
 """In a table: 7 hours of an IMU at 400 Hz."""
+LONGEST_LINE = 100_000
+"""Characters of a line at most: some thousand columns."""
 SHOWN = 200
 """Characters of a file that a message quotes at most."""
+
+TIMES = (-LATEST, LATEST)
+"""Valid values of a time, s."""
 
 Limits = Mapping[str, tuple[float, float]]
 """Valid values, inclusive, of columns that have bounds."""
@@ -53,7 +60,7 @@ def read_table(
             finite number or out of its limits; the message names file and line.
     """
     lines = _lines(path)
-    header = [name.strip() for name in lines[0].split(",")] if lines else []
+    header = [name.strip() for name in lines[0].split(",")]
     wanted: list[str] = []
     for group in required + optional:
         missing = [name for name in group if name not in header]
@@ -113,7 +120,11 @@ def seconds(time: float) -> str:
 
 
 def _lines(path: Path) -> list[str]:
-    """Lines of a plain or gzipped text file, without blank ones at its end."""
+    """Lines of a plain or gzipped text file, without blank ones at its end.
+
+    A line ends with a line feed, perhaps after a carriage return, and with nothing else: what is counted before the
+    text is split is what it is split at.
+    """
     try:
         with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
             data = file.read(LARGEST + 1)
@@ -121,12 +132,22 @@ def _lines(path: Path) -> list[str]:
             raise ValueError(f"{path}: has more than {LARGEST} bytes of text, which is the limit; cut the log in parts")
         if data.count(b"\n") > MOST_LINES:
             raise ValueError(f"{path}: has more than {MOST_LINES} lines, which is the limit; cut the log in parts")
-        text = data.decode("utf-8-sig")
+        if data.count(b"\r") > data.count(b"\r\n"):
+            line = data.count(b"\n", 0, re.search(rb"\r(?!\n)", data).start()) + 1  # type: ignore[union-attr]
+            raise ValueError(
+                f"{path}, line {line}: a carriage return without a line feed; lines must end with \\n or \\r\\n"
+            )
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: cannot be read: it is no text in UTF-8: {error.reason}") from None
     except (OSError, EOFError, zlib.error) as error:
         raise ValueError(f"{path}: cannot be read: {error}") from None
-    return text.rstrip().splitlines()
+    lines = text.rstrip().split("\n")
+    longest = max(map(len, lines))
+    if longest > LONGEST_LINE:
+        line = next(number for number, text in enumerate(lines, 1) if len(text) == longest)
+        raise ValueError(f"{path}, line {line}: has {longest} characters; valid are {LONGEST_LINE} at most")
+    return lines
 
 
 def _bad_value(path: Path, lines: list[str], wanted: list[str], places: list[int]) -> ValueError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from dataclasses import dataclass, fields
 from os import PathLike
 
@@ -45,6 +46,24 @@ COLUMNS = {
     "tgd": "tgd_s",
 }
 """Columns of the table that `read_csv` reads, by the names of `Ephemeris`."""
+LIMITS = {
+    "svid": (1.0, 999.0),
+    **dict.fromkeys(("toe_s", "toc_s"), (-WEEK, 2.0 * WEEK)),
+    "sqrta": (2530.0, 8192.0),
+    "ecc": (0.0, 0.49),
+    **dict.fromkeys(("m0_rad", "omega_rad", "omega0_rad", "i0_rad"), (-100.0, 100.0)),
+    **dict.fromkeys(("dn_radps", "omegadot_radps", "idot_radps"), (-1e-4, 1e-4)),
+    **dict.fromkeys(("cuc_rad", "cus_rad", "cic_rad", "cis_rad"), (-0.01, 0.01)),
+    **dict.fromkeys(("crc_m", "crs_m"), (-1e4, 1e4)),
+    "af0_s": (-1.0, 1.0),
+    "af1": (-1e-6, 1e-6),
+    "af2": (-1e-12, 1e-12),
+    "tgd_s": (-1e-3, 1e-3),
+}
+"""Valid values, inclusive, of the columns of a table: axes from the Earth's surface to what the message can carry, and
+ten times what it can carry of corrections or more; angles may be several turns."""
+LARGEST_TABLE = 1_000_000
+"""Bytes of a table at most: some thousand satellites."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,17 +212,60 @@ def read_csv(path: str | PathLike[str]) -> Ephemeris:
     Angles are in radians, lengths in metres, times in seconds of the GPS week.
 
     Raises:
-        ValueError: a column is missing, a value is not a number, a satellite is there twice, or none is healthy.
+        ValueError: the file is too large or cannot be read, a column is missing, a value is not a number, or one of a
+            healthy satellite out of `LIMITS`, such a satellite is there twice, or none is healthy.
     """
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        rows = list(csv.DictReader(file))
+    lines, rows = _rows(path)
     wanted = ["svid", "sv_health", *COLUMNS.values()]
     missing = [name for name in wanted if not rows or name not in rows[0]]
     if missing:
         raise ValueError(f"ephemeris {path}: columns {', '.join(missing)} are missing")
-    table = np.array([[_number(path, line, name, row[name]) for name in wanted] for line, row in enumerate(rows, 2)])
-    table = table[table[:, 1] == 0.0]
-    return from_sets(table[:, 0], dict(zip(COLUMNS, table[:, 2:].T, strict=True)))
+    table = np.array(
+        [[_number(path, line, name, row[name]) for name in wanted] for line, row in zip(lines, rows, strict=True)]
+    )
+    healthy = np.flatnonzero(table[:, 1] == 0.0)
+    if len(healthy) == 0:
+        raise ValueError(f"ephemeris {path}: there must be one satellite or more that is healthy (sv_health = 0)")
+    seen: dict[float, int] = {}
+    for place in healthy.tolist():
+        _check_row(path, lines[place], dict(zip(wanted, table[place].tolist(), strict=True)))
+        first = seen.setdefault(table[place, 0], lines[place])
+        if first != lines[place]:
+            raise ValueError(
+                f"ephemeris {path}, line {lines[place]}: satellite {table[place, 0]:.0f} is there twice, first in line "
+                f"{first}"
+            )
+    return from_sets(table[healthy, 0], dict(zip(COLUMNS, table[healthy, 2:].T, strict=True)))
+
+
+def _rows(path: str | PathLike[str]) -> tuple[list[int], list[dict[str, str | None]]]:
+    """The rows of a table below its header, and the lines in which they end."""
+    size = os.stat(path).st_size
+    if size > LARGEST_TABLE:
+        raise ValueError(f"ephemeris {path}: has {size} bytes; valid are {LARGEST_TABLE} at most")
+    lines, rows = [], []
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            for row in reader:
+                lines.append(reader.line_num)
+                rows.append(dict(row))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"ephemeris {path}: cannot be read: it is no text in UTF-8: {error.reason}") from None
+    except csv.Error as error:
+        raise ValueError(f"ephemeris {path}, line {reader.line_num}: cannot be read: {error}") from None
+    return lines, rows
+
+
+def _check_row(path: str | PathLike[str], line: int, values: dict[str, float]) -> None:
+    """Refuse what no broadcast message of a satellite says."""
+    for name, (low, high) in LIMITS.items():
+        if not low <= values[name] <= high:
+            raise ValueError(
+                f"ephemeris {path}, line {line}: {name} must be between {low:g} and {high:g}, got {values[name]!r}"
+            )
+    if values["svid"] % 1.0:
+        raise ValueError(f"ephemeris {path}, line {line}: svid must be a whole number, got {values['svid']!r}")
 
 
 def _number(path: str | PathLike[str], line: int, name: str, text: str | None) -> float:

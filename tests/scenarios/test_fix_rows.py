@@ -122,6 +122,16 @@ def test_an_attack_that_jumps_and_stays_is_kept() -> None:
         assert not wild_fixes(time, track).any()
 
 
+def test_a_track_that_leaps_once_has_no_wild_fix() -> None:
+    """At 5 Hz the vehicle could have gone that far soon; where the leap goes is the track, whatever came before it."""
+    time = 0.2 * np.arange(200)
+    track = np.column_stack([np.zeros(200), 12.0 * time, np.zeros(200)])
+    track[100:, 0] += 65.0
+    assert not wild_fixes(time, track, 15).any()
+    track[108:, 0] -= 65.0
+    np.testing.assert_array_equal(np.flatnonzero(wild_fixes(time, track, 15)), np.arange(100, 108))
+
+
 def test_a_vehicle_that_stands_longer_than_it_drives_is_no_wild_one() -> None:
     """Its median speed is zero; fast straight flight, holes in the fixes and a turn back are still believed."""
     time = np.concatenate([np.arange(60.0), np.arange(70.0, 100.0)])
@@ -166,9 +176,23 @@ def test_a_sigma_of_zero_is_unknown(tmp_path: Path, column: str, default: float)
 
 @pytest.mark.parametrize("column", ["sd_d_m", "sd_vn_mps", "sd_vd_mps"])
 def test_a_component_of_unknown_sigma_is_not_measured(tmp_path: Path, column: str) -> None:
-    found = known(tmp_path, put(table(), 4, **{column: 4294967.295}))
+    with pytest.warns(
+        LogWarning, match=rf"1 of 40 rows have a sigma of 99 or more \({column}\), .* not measured; .* line 6$"
+    ):
+        found = known(tmp_path, put(table(), 4, **{column: 4294967.295}))
     assert found[column][4] == 1000.0
     assert found[column][5] < 2.0
+
+
+def test_sigmas_that_are_not_measured_are_told_from_the_start_on_in_one_line(tmp_path: Path) -> None:
+    rows = put(table(), slice(10, 30), sd_vn_mps=9999.0, sd_ve_mps=9999.0)
+    rows = put(rows, slice(None), sd_d_m=999.0)
+    with pytest.warns(LogWarning, match=r"40 of 40 rows .* \(sd_d_m, sd_ve_mps, sd_vn_mps\)") as caught:
+        known(tmp_path, rows)
+    assert len(caught) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        known(tmp_path, put(table(), 4, sd_d_m=999.0), 5.0)
 
 
 def test_a_table_without_sigmas(tmp_path: Path) -> None:

@@ -35,6 +35,30 @@ def notes(folder: Path, text: str, encoding: str = "utf-8") -> Notes:
         ("[sensor]\nimu_delay_s = 0.5", "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [sensor]"),
         ("[notes]\nimu_delay_s = 0.5", "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [notes]"),
         ("[notes]\nIMU_delay = 0.5", "'imu_delay_s' must stand above all tables, got 'IMU_delay' in [notes]"),
+        ("[[imu]]\nimu_delay_s = 0.1", "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [imu]"),
+        ("imu = [{imu_delay_s = 1}]", "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [imu]"),
+        ("imu = [1, {a = [{start_s = 1}]}]", "'start_s' must stand above all tables, got 'start_s' in [imu.a]"),
+        ("[[imu]]\nmaker = 'x'", "imu must not be a table"),
+        ("[[notes]]\nimu_delay_s = 0.1", "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [notes]"),
+        ("[[notes]]\nmaker = 'x'", "notes must be one table [notes], not a list of tables"),
+        (
+            "[notes.sub]\nimu_delay_s = 0.1",
+            "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [notes.sub]",
+        ),
+        ("[notes.a.b]\nantenna_lever_arm_m = [1, 0, 0]", "got 'antenna_lever_arm_m' in [notes.a.b]"),
+        (
+            "[[notes.a]]\nGNSS_delay_s = 1",
+            "'gnss_delay_s' must stand above all tables, got 'GNSS_delay_s' in [notes.a]",
+        ),
+        ('[notes]\nimu_delay_s = "0.1"', "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [notes]"),
+        ('[notes]\nimu_delay = "0.1"', "'imu_delay_s' must stand above all tables, got 'imu_delay' in [notes]"),
+        ('[notes]\nimu_delay_s = "half"', "'imu_delay_s' must stand above all tables, got 'imu_delay_s' in [notes]"),
+        (
+            "[notes]\nlever_arm = [1, 0, 0]",
+            "'antenna_lever_arm_m' must stand above all tables, got 'lever_arm' in [notes]",
+        ),
+        ("notes = 3", "notes must be a table, got 3"),
+        ("notes = []", "notes must be a table, got []"),
         ("[sensor]\nmaker = 'x'", "unknown table [sensor]"),
     ],
 )
@@ -45,6 +69,7 @@ def test_an_unknown_key_is_refused_with_the_one_that_is_meant(tmp_path: Path, li
 
 def test_remarks_and_a_table_of_notes_are_welcome(tmp_path: Path) -> None:
     text = GOOD + "vehicle = 'car'\nweek = 2000\n[notes]\ncolour = 'red'\nweight = 3\nname = 'x'\n[notes.more]\na = 1\n"
+    text += "start = 'in a garage'\n[[notes.people]]\nname = 'y'\n"
     assert notes(tmp_path, text).name("log") == "log"
 
 
@@ -71,6 +96,13 @@ def test_a_byte_order_mark_and_windows_lines(tmp_path: Path, encoding: str) -> N
 def test_a_time_of_another_type_is_refused(tmp_path: Path, value: str) -> None:
     with pytest.raises(ValueError, match="imu_delay_s must be a finite number of seconds, got"):
         notes(tmp_path, GOOD + f"imu_delay_s = {value}\n").seconds("imu_delay_s", 0.0)
+
+
+@pytest.mark.parametrize("key", ["imu_delay_s", "gnss_delay_s", "start_s"])
+def test_a_time_has_a_limit(tmp_path: Path, key: str) -> None:
+    text = "imu_to_body_frd = []\n" + f"{key} = 1e300\n"
+    with pytest.raises(ValueError, match=rf"log\.toml: {key} must be .*1e\+12, got 1e\+300$"):
+        notes(tmp_path, text).seconds(key, 0.0)
 
 
 @pytest.mark.parametrize(

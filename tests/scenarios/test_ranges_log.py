@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -172,12 +173,14 @@ def test_troposphere_against_an_independent_library() -> None:
     [
         ("cn0_dbhz", "cn0", r"ranges\.csv, line 1: column 'cn0_dbhz' is missing"),
         (",45\n", ",450\n", r"ranges\.csv, line 2: cn0_dbhz must be between 0 and 100"),
+        (",-?[0-9.]+,45\n", ",1e300,45\n", r"ranges\.csv, line 2: range_rate_mps must be between"),
+        (",-?[0-9.]+(,-?[0-9.]+,45\n)", r",1e300\1", r"ranges\.csv, line 2: pseudorange_m must be between"),
         (",45\n", ",x\n", r"ranges\.csv, line 2: cn0_dbhz must be a finite number"),
     ],
 )
 def test_bad_ranges_are_named(folder: Path, tmp_path: Path, old: str, new: str, message: str) -> None:
     (tmp_path / "ephemeris.csv").write_text((folder / "ephemeris.csv").read_text())
-    (tmp_path / "ranges.csv").write_text((folder / "ranges.csv").read_text().replace(old, new, 1))
+    (tmp_path / "ranges.csv").write_text(re.sub(old, new, (folder / "ranges.csv").read_text(), count=1))
     with pytest.raises(ValueError, match=message):
         read_ranges(tmp_path)
 

@@ -193,6 +193,9 @@ def test_specification_and_environment(folder: Path) -> None:
         ({"grade": "gold"}, "unknown IMU grade 'gold'; valid grades"),
         ({"sigma_floor": 0.0}, "sigma_floor must be"),
         ({"noise_factor": -1.0}, "noise_factor must be"),
+        ({"noise_factor": 1e5}, r"recorded: noise_factor must be .*, from 0\.001 to 1000\.?0?, got 100000\.0"),
+        ({"noise_factor": 1e-5}, "recorded: noise_factor must be .*, got 1e-05"),
+        ({"noise_factor": 1e300}, r"recorded: noise_factor must be .*, got 1e\+300"),
     ],
 )
 def test_bad_options(folder: Path, options: dict, message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import gymnasium
@@ -216,6 +217,29 @@ def test_what_a_log_of_ranges_cannot_do(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "log" / "ranges.csv").write_text("\n".join([lines[0], *rows]))
     with pytest.raises(ValueError, match=r"must come at a steady rate: after .* the next come 1\.4 s later"):
         tight(tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("late", "message"),
+    [
+        (
+            604_800.0,
+            r"ranges\.csv leaves out 6\.048e\+05 epochs of 1 s, valid are 20000 at most: after 4\d+\.\d+ s the next",
+        ),
+        (1e300, r"ranges\.csv, line \d+: t_s must be between"),
+    ],
+)
+def test_a_late_epoch_does_not_fill_the_memory(tmp_path: Path, late: float, message: str) -> None:
+    write_drive(tmp_path, turns=4)
+    header, *lines = (tmp_path / "ranges.csv").read_text().splitlines()
+    number, time, *rest = lines[-1].split(",")
+    lines[-1] = ",".join([number, repr(float(time) + late), *rest])
+    (tmp_path / "ranges.csv").write_text("\n".join([header, *lines]))
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=message):
+        tight(tmp_path)
+    assert tracemalloc.get_traced_memory()[1] < 3e8
+    tracemalloc.stop()
 
 
 @pytest.mark.skipif(not PHONE.is_dir(), reason="../shared/data, real logs for tests, is absent")

@@ -14,9 +14,11 @@ import spoofgym  # noqa: F401
 from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.recorded import evaluate_recorded
+from spoofgym.geodesy import displace
 from spoofgym.scenarios.log import Fixes, covered
 from spoofgym.scenarios.log_warning import LogWarning
 from spoofgym.scenarios.recorded import recorded
+from spoofgym.scenarios.reference import frozen_rows
 from tests.scenarios.test_recorded import write_log
 
 Row = list[float]
@@ -127,6 +129,72 @@ def test_a_row_of_zeros_or_out_of_reach_is_no_truth(tmp_path: Path, place: Row, 
     with pytest.warns(LogWarning, match=rf"reference\.csv: 1 of \d+ rows .*{said}"):
         row = largest(edited(tmp_path / "log", lambda time: True, change))
     assert row["max_error_m"] < 1.5
+
+
+def between(first: float, last: float, change: Callable[[Row], Row]) -> Callable[[Row], Row]:
+    """A change of the rows from one time to another."""
+    return lambda row: change(row) if first - 1e-6 < row[0] < last - 1e-6 else row
+
+
+def far(row: Row) -> Row:
+    return [row[0], row[1] + 1.0, *row[2:]]
+
+
+def test_a_stretch_of_three_seconds_that_is_out_of_reach_is_no_truth(tmp_path: Path) -> None:
+    """At 5 Hz it has more rows than the three that a receiver is forgiven."""
+    with pytest.warns(LogWarning, match=r"reference\.csv: 8 of \d+ rows .*impossible"):
+        row = largest(edited(tmp_path / "log", lambda time: True, between(80.0, 81.6, far)))
+    assert row["max_error_m"] < 1.5
+
+
+def test_a_longer_stretch_far_from_the_fixes_is_told(tmp_path: Path) -> None:
+    folder = edited(tmp_path / "log", lambda time: True, between(80.0, 90.0, far))
+    with pytest.warns(
+        LogWarning, match=r"reference\.csv: 50 of \d+ rows lie more than 50 m .*up to 11\d+ m, .* line 401"
+    ):
+        recorded(str(folder))
+
+
+@pytest.mark.parametrize("column", [1, 2])
+def test_a_row_with_half_a_position_is_no_truth(tmp_path: Path, column: int) -> None:
+    def change(row: Row) -> Row:
+        return [*row[:column], 0.0, *row[column + 1 :]]
+
+    with pytest.warns(LogWarning, match=r"reference\.csv: 50 of \d+ rows have lat_deg = 0 or lon_deg = 0"):
+        row = largest(edited(tmp_path / "log", lambda time: True, between(80.0, 90.0, change)))
+    assert row["max_error_m"] < 1.5
+
+
+@pytest.mark.parametrize("last", [88.0, 200.0])
+@pytest.mark.parametrize("columns", [4, 7])
+def test_a_frozen_reference_is_no_truth(tmp_path: Path, columns: int, last: float) -> None:
+    held: Row = []
+
+    def change(row: Row) -> Row:
+        held[:] = held or row
+        return [row[0], *held[1:columns], *row[columns:]]
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        row = largest(edited(tmp_path / "log", lambda time: True, between(80.0, last, change)))
+    assert any("rows repeat a position for more than 1 s" in str(warning.message) for warning in caught)
+    assert row["max_error_m"] < 1.5
+
+
+def test_the_reference_of_a_vehicle_that_stands_stays() -> None:
+    """Its fixes wander; and where a spoofer carries them away, the vehicle still stands."""
+    time = np.arange(0.0, 100.0, 0.2)
+    north = 12.0 * np.minimum(time, 40.0) + np.where(time > 70.0, 1.5 * np.square(time - 70.0), 0.0)
+    north -= np.where(time < 40.0, 0.5 * 3.0 * 4.0**2 * np.square(np.clip((time - 36.0) / 4.0, 0.0, 1.0)), 24.0)
+    start = np.array([np.radians(45.0), np.radians(9.0), 100.0])
+    place = displace(start, np.column_stack([0.0 * time, north, 0.0 * time]))
+    place[(time >= 40.0) & (time <= 70.0)] = place[np.searchsorted(time, 40.0)]
+    reference = Fixes(time, place, None, None, None)
+    generator = np.random.default_rng(0)
+    for pull in (0.0, 3.0):
+        moved = generator.standard_normal((100, 3)) + np.outer(pull * np.clip(time[::5] - 45.0, 0.0, 20.0), [1, 0, 0])
+        fixes = Fixes(time[::5], displace(place[::5], moved), None, np.ones((100, 3)), None)
+        assert not frozen_rows(reference, fixes).any()
 
 
 @pytest.mark.parametrize(("late", "shift"), [(1.0, "-1.0"), (-2.0, r"\+(1\.9|2\.0)")])

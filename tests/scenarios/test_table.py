@@ -43,9 +43,30 @@ def test_an_archive_of_empty_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         read_table(path, GROUP, [], {})
 
 
+@pytest.mark.parametrize("end", ["\r", "\v", "\f", "\x1c", "\x85", "\u2028"])
+def test_only_a_line_feed_ends_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str) -> None:
+    """What is not counted is not split at either: an archive of it does not become millions of texts."""
+    monkeypatch.setattr(table, "LARGEST", 2**24)
+    path = bomb(tmp_path / "gnss.csv.gz", ("ab" + end).encode() * 2**16, 32)
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"gnss\.csv\.gz, line 1: (a carriage return without|has \d+ characters)"):
+        read_table(path, GROUP, [], {})
+    assert tracemalloc.get_traced_memory()[1] < 2**26
+    tracemalloc.stop()
+
+
+def test_carriage_returns_before_line_feeds_and_others(tmp_path: Path) -> None:
+    path = tmp_path / "gnss.csv"
+    path.write_bytes(b"t_s,x\r\n1,2\r\n2,3\r\n\r\n")
+    np.testing.assert_array_equal(read_table(path, GROUP, [], {})["x"], [2.0, 3.0])
+    path.write_bytes(b"t_s,x\n1,2\n2,3\r3,4\n4,5\n")
+    with pytest.raises(ValueError, match=r"line 3: a carriage return without a line feed"):
+        read_table(path, GROUP, [], {})
+
+
 def test_a_message_does_not_quote_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "gnss.csv"
-    for text in (100_000 * "a", "t_s,x\n1,2\n2," + 100_000 * "y"):
+    for text in (90_000 * "a", "t_s,x\n1,2\n2," + 90_000 * "y"):
         path.write_text(text)
         with pytest.raises(ValueError, match="line") as caught:
             read_table(path, GROUP, [], {})

@@ -213,6 +213,51 @@ def test_a_table_that_is_not_one_is_refused(tmp_path):
             read_csv(tmp_path / "bad.csv")
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [
+        ("ecc", "1e300", "ecc must be between 0 and 0.49, got 1e[+]300"),
+        ("ecc", "0.99", "ecc must be between 0 and 0.49, got 0.99"),
+        ("ecc", "0.5", "ecc must be between 0 and 0.49, got 0.5"),
+        ("svid", "1.5", "svid must be a whole number, got 1.5"),
+        ("sqrta", "0", "sqrta must be between 2530 and 8192, got 0.0"),
+        *((name, "1e300", f"{name} must be between .* got 1e[+]300") for name in ("svid", *COLUMNS.values())),
+    ],
+)
+def test_a_value_that_no_message_has_is_named(tmp_path, column, value, message):
+    path = tmp_path / "table.csv"
+    write_table(path, synthetic(3), np.array([0, 0, 63]))
+    lines = path.read_text().splitlines()
+    place = lines[0].split(",").index(column)
+    for line in (3, 4):
+        cells = lines[line - 1].split(",")
+        cells[place] = value
+        path.write_text("\n".join([*lines[: line - 1], ",".join(cells), *lines[line:]]))
+        if line == 4:  # nothing is made of a satellite that is not healthy
+            assert len(read_csv(path).satellites) == 2
+            continue
+        with pytest.raises(ValueError, match=rf"table\.csv, line 3: {message}"):
+            read_csv(path)
+
+
+def test_a_table_with_a_satellite_twice_no_text_and_one_too_large(tmp_path):
+    path = tmp_path / "table.csv"
+    write_table(path, synthetic(2), np.array([0, 0]))
+    text = path.read_text()
+    path.write_text(text + "\n" + text.splitlines()[1])
+    with pytest.raises(ValueError, match=r"table\.csv, line 5: satellite \d+ is there twice, first in line 2"):
+        read_csv(path)
+    path.write_bytes(text.encode("utf-16"))
+    with pytest.raises(ValueError, match=r"table\.csv: cannot be read: it is no text in UTF-8"):
+        read_csv(path)
+    path.write_text(text + 200_000 * "1")
+    with pytest.raises(ValueError, match=r"table\.csv, line 3: cannot be read: field larger than field limit"):
+        read_csv(path)
+    path.write_text(text + 1_000_000 * "1")
+    with pytest.raises(ValueError, match=r"table\.csv: has \d+ bytes; valid are 1000000 at most"):
+        read_csv(path)
+
+
 def test_a_table_with_a_byte_order_mark(tmp_path):
     ephemeris = synthetic(2)
     write_table(tmp_path / "table.csv", ephemeris, np.array([0, 0]))
