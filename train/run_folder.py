@@ -19,7 +19,15 @@ from typing import Any
 
 from agents.learned import CONFIG_FILE, environment_of, read_config
 from spoofgym import files
-from spoofgym.command_line import LARGEST_LEARNER_SEED, MOST_COUNT, MOST_THREADS, count, learner_seed, run_folder, threads
+from spoofgym.command_line import (
+    LARGEST_LEARNER_SEED,
+    MOST_COUNT,
+    MOST_THREADS,
+    count,
+    learner_seed,
+    run_folder,
+    threads,
+)
 from train import checkpoint
 
 CHECKPOINT_FILE = "checkpoint.pt"
