@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from spoofgym.command_line import STDOUT, Parser, add_json, count, run_folder, seed_number
+from spoofgym.command_line import STDOUT, Parser, add_json, count, learner_seed, run_folder
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig
 from spoofgym.program import do_all, give_json, program
 from train import evaluate, spoofer
@@ -30,7 +30,7 @@ from train.run_folder import DEFAULT_STEPS, RunFolder
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train and evaluate each seed, and print a table."""
     parser = Parser(prog="python -m benchmarks.learning", description=main.__doc__)
-    parser.add_argument("--seeds", type=seed_number, nargs="+", default=[0, 1, 2], help="(default: %(default)s)")
+    parser.add_argument("--seeds", type=learner_seed, nargs="+", default=[0, 1, 2], help="(default: %(default)s)")
     parser.add_argument("--detector", default="snapshot", help="(default: %(default)s)")
     parser.add_argument("--knowledge", default="shadow", choices=KNOWLEDGE, help="(default: %(default)s)")
     parser.add_argument("--action", default="rate", choices=ACTIONS, help="(default: %(default)s)")

@@ -12,6 +12,10 @@ from spoofgym import files
 
 STDOUT = "-"
 MOST_THREADS = 1024
+MOST_COUNT = 10**12
+"""Of anything: no computer would come to an end with more."""
+LARGEST_LEARNER_SEED = 2**32 - 1
+"""NumPy's older generator, which Stable-Baselines3 seeds, takes no larger one; those of the games do."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -24,12 +28,23 @@ class Parser(argparse.ArgumentParser):
 
 def count(text: str) -> int:
     """A whole number of 1 or more; ``1e6`` and ``1_000_000`` are understood."""
+    return _whole(text, 1)
+
+
+def count_or_none(text: str) -> int:
+    """A whole number of 0 or more, written as that of `count`."""
+    return _whole(text, 0)
+
+
+def _whole(text: str, least: int) -> int:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or value != int(value) or value < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number, 1 or more, got {text!r}")
+    if not math.isfinite(value) or value != int(value) or value < least:
+        raise argparse.ArgumentTypeError(f"expected a whole number, {least} or more, got {text!r}")
+    if value > MOST_COUNT:
+        raise argparse.ArgumentTypeError(f"expected a whole number, {MOST_COUNT:,} or less, got {text!r}")
     return int(value)
 
 
@@ -49,6 +64,14 @@ def seed_number(text: str) -> int:
         value = -1
     if value < 0:
         raise argparse.ArgumentTypeError(f"expected a whole number, 0 or more, got {text!r}")
+    return value
+
+
+def learner_seed(text: str) -> int:
+    """A seed of a training."""
+    value = seed_number(text)
+    if value > LARGEST_LEARNER_SEED:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 to {LARGEST_LEARNER_SEED}, got {text!r}")
     return value
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from copy import copy
 from typing import Any
 
 from rich.console import Console, Group, RenderableType
@@ -46,7 +47,8 @@ def show(terminal: Console, what: RenderableType) -> None:
     """Print a table, a text or a group of them, and leave nothing out.
 
     A table that is too wide for the terminal has the names in its first column folded. If it is still too wide, its
-    lines go on in the next line of the terminal: a figure is never cut.
+    lines go on in the next line of the terminal: a figure is never cut. On an output that is no terminal, the title and
+    the caption of a table take one line each.
     """
     for part in what.renderables if isinstance(what, Group) else [what]:
         if isinstance(part, Table):
@@ -56,6 +58,19 @@ def show(terminal: Console, what: RenderableType) -> None:
 
 
 def _show_table(terminal: Console, table: Table) -> None:
+    if terminal.is_terminal:
+        _show_rows(terminal, table)
+        return
+    rows = copy(table)  # a table folds its title and caption to its own width
+    rows.title = rows.caption = None
+    if table.title is not None:
+        terminal.print(table.title)
+    _show_rows(terminal, rows)
+    if table.caption is not None:
+        terminal.print(table.caption)
+
+
+def _show_rows(terminal: Console, table: Table) -> None:
     given = terminal.width
     if _natural_width(terminal, table) > given:
         table.columns[0].max_width, table.columns[0].no_wrap = NARROW_NAME, False

@@ -40,6 +40,28 @@ def test_nothing_is_wrapped_where_the_output_is_no_terminal(monkeypatch, capsys)
     assert ("a legend " * 40).strip() in [line.strip() for line in lines]
 
 
+def test_a_title_and_a_caption_take_one_line_where_the_output_is_no_terminal(monkeypatch, capsys):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    given = table()
+    given.caption = "error: what is meant by it; [after]: a name in brackets; " * 6
+    title, caption = given.title, given.caption
+    for _ in range(2):  # the table itself is left as it is
+        show(console(), given)
+        lines = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+        assert lines[0] == title
+        assert lines[-1] == caption.rstrip()
+    assert (given.title, given.caption) == (title, caption)
+
+
+def test_a_terminal_has_a_caption_as_wide_as_the_table():
+    file, given = io.StringIO(), table()
+    given.caption = "what is meant " * 20
+    show(PlainConsole(file=file, force_terminal=True, color_system=None, markup=False, width=200), given)
+    lines = file.getvalue().splitlines()
+    assert sum("what is meant" in line for line in lines) > 1
+    assert max(map(len, lines)) < 140
+
+
 def test_an_output_has_the_width_that_is_asked_for(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "50")
     console().print(Text("some words " * 20))

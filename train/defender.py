@@ -112,8 +112,9 @@ class Training:
         """
         self._run, self._folder, self._console = run, folder, terminal
         self._config: DefenderConfig = run.environment
-        self._learner = make_learner(self._config, run.learner, run.seed, folder.path)
-        self._world = _validation_world(self._config)
+        with folder.naming_settings():
+            self._learner = make_learner(self._config, run.learner, run.seed, folder.path)
+            self._world = _validation_world(self._config)
         self._validation: Rows = []
         self._best: LearnedDefender | None = None
         self._begun = False

@@ -11,13 +11,23 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from agents.learned import CONFIG_FILE, environment_of, read_config
 from spoofgym import files
-from spoofgym.command_line import MOST_THREADS, count, run_folder, seed_number, threads
+from spoofgym.command_line import (
+    LARGEST_LEARNER_SEED,
+    MOST_COUNT,
+    MOST_THREADS,
+    count,
+    learner_seed,
+    run_folder,
+    threads,
+)
 from train import checkpoint
 
 CHECKPOINT_FILE = "checkpoint.pt"
@@ -66,7 +76,7 @@ def add_options(parser: argparse.ArgumentParser, folder: str) -> None:
     add("--steps", type=count,
         help=f"GNSS epochs to play, rounded up to whole rollouts (default: {DEFAULT_STEPS}); with --resume, a larger "
         "number lengthens a run that has come to its end")
-    add("--seed", type=seed_number, help="of all random numbers of the run (default: 0)")
+    add("--seed", type=learner_seed, help="of all random numbers of the run (default: 0)")
     add("--out", type=run_folder, default=Path(folder), help="run folder (default: %(default)s)")
     add("--threads", type=threads, help="of the learner and the simulation (default: 1)")
     add("--resume", action="store_true", default=False,
@@ -141,7 +151,21 @@ class RunFolder:
             learner = learner_type(**content["learner"])
             if environment.threads > MOST_THREADS:
                 raise ValueError(f"threads must be {MOST_THREADS} or fewer, got {environment.threads}")
-            return Run(environment, learner, checkpoint.whole(content["seed"]), _steps(content["steps"]))
+            return Run(environment, learner, _seed(content["seed"]), _steps(content["steps"]))
+
+    @contextmanager
+    def naming_settings(self) -> Iterator[None]:
+        """What is wrong with the parts of a run that was started here is told with the name of its file.
+
+        Raises:
+            ValueError: naming the file, where there is one, and the reason.
+        """
+        try:
+            yield
+        except (ValueError, FileNotFoundError) as error:
+            if not self.holds_run:
+                raise
+            raise ValueError(f"{self.path / CONFIG_FILE}: {error}") from error
 
     def resumed(self, given: dict[str, Any]) -> Run:
         """The run that goes on here, with the options that were given beside ``--resume``.
@@ -214,9 +238,15 @@ def given_options(options: argparse.Namespace) -> dict[str, Any]:
     return {name: value for name, value in vars(options).items() if name not in ("out", "resume")}
 
 
+def _seed(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= LARGEST_LEARNER_SEED:
+        raise ValueError(f"seed must be a whole number from 0 to {LARGEST_LEARNER_SEED}, got {value!r}")
+    return value
+
+
 def _steps(value: Any) -> int:
-    if checkpoint.whole(value) < 1:
-        raise ValueError("steps must be 1 or more, got 0")
+    if not 1 <= checkpoint.whole(value) <= MOST_COUNT:
+        raise ValueError(f"steps must be from 1 to {MOST_COUNT:,}, got {value}")
     return int(value)
 
 

@@ -109,7 +109,8 @@ class Training:
         self._run, self._folder, self._console = run, folder, terminal
         self._trials = run.learner.trials
         self._place = Place()
-        self._learner = self._made(0)
+        with folder.naming_settings():
+            self._learner = self._made(0)
         state = folder.state()
         if state is not None:
             self._place = self._read(state)

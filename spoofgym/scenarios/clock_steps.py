@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.constants import speed_of_light
-from scipy.ndimage import median_filter
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.scenarios.range_fixes import RangeSolution, between_fixes, solve_ranges
@@ -33,8 +33,10 @@ EXACT = 100.0
 """A step that is not further from whole milliseconds, m, nor than half of what makes a step, has just that size."""
 UNKNOWN = 1000.0
 """1 sigma of the clock after any other step, m."""
-NEIGHBOURS = 21
-"""Epochs whose median tells the rate of the clock."""
+NEIGHBOURS = 10
+"""Epochs to either side whose median, with the epoch's own, tells the rate of the clock."""
+FEWEST = 3
+"""Epochs, fewer of which do not tell which of them lies beyond the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +93,7 @@ def find_steps(solution: RangeSolution) -> ClockSteps:
     clock[solved], sigma[solved] = solution.clock[solved], solution.clock_sigma[solved]
     drift[solved], drift_sigma[solved] = solution.clock_drift[solved], solution.clock_drift_sigma[solved]
     known, rate = np.flatnonzero(np.isfinite(drift)), np.zeros(len(drift))
-    rate[known] = _spikes(drift[known], drift_sigma[known])
+    rate[known] = _spikes(corrected.geometry.time[known], drift[known], drift_sigma[known])
     steady = np.interp(np.arange(len(clock)), known, (drift - rate)[known])
     known, size, variance = np.flatnonzero(np.isfinite(clock)), np.zeros(len(clock)), np.zeros(len(clock))
     time = corrected.geometry.time[known]
@@ -107,10 +109,22 @@ def _common(values: Floats, present: Flags) -> Floats:
     return result
 
 
-def _spikes(drift: Floats, sigma: Floats) -> Floats:
-    """What lies beyond the rate of the neighbouring epochs, (n,), m/s; 0 where it is not much."""
-    beyond = drift - median_filter(drift, NEIGHBOURS, mode="nearest")
-    return np.where(np.abs(beyond) > RATE_STEP * sigma, beyond, 0.0)
+def _spikes(time: Floats, drift: Floats, sigma: Floats) -> Floats:
+    """What lies beyond the rate of the neighbouring epochs, (n,), m/s; 0 where it is not much.
+
+    At an end of the log the neighbours are those of one side: the rate may have changed between their time and this.
+    """
+    if len(drift) < FEWEST:
+        return np.zeros(len(drift))
+    beyond, lag = drift - _median_around(drift), time - _median_around(time)
+    return np.where(np.abs(beyond) > RATE_STEP * sigma + DRIFT_CHANGE * np.abs(lag), beyond, 0.0)
+
+
+def _median_around(values: Floats) -> Floats:
+    """Median of each value and its neighbours, (n,), of those alone that there are."""
+    padded = np.pad(values, NEIGHBOURS, constant_values=np.nan)
+    result: Floats = np.nanmedian(sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1)
+    return result
 
 
 def _sizes(time: Floats, clock: Floats, sigma: Floats, drift: Floats) -> tuple[Floats, Floats]:

@@ -9,7 +9,7 @@ import pytest
 from scipy.constants import speed_of_light
 
 from spoofgym.geodesy import position_difference
-from spoofgym.scenarios.clock_steps import MILLISECOND, find_steps, without_steps
+from spoofgym.scenarios.clock_steps import MILLISECOND, _spikes, find_steps, without_steps
 from spoofgym.scenarios.range_fixes import solve_ranges
 from spoofgym.scenarios.ranges_log import read_ranges
 from spoofgym.scenarios.recorded import recorded
@@ -113,6 +113,33 @@ def test_steps_are_found_where_they_are_and_as_large(tmp_path: Path) -> None:
     assert size[60] == pytest.approx(0.1 * MILLISECOND, abs=60.0)
     np.testing.assert_array_equal(np.flatnonzero(steps.variance), [60])
     np.testing.assert_allclose(steps.rate[[30, 60, 80]], [MILLISECOND, 0.1 * MILLISECOND, -2.0 * MILLISECOND], atol=3.0)
+
+
+@pytest.mark.parametrize("at", [(0,), (1,), (137,), (138,), (0, 1, 2), (134, 136, 138), (135, 136, 137, 138)])
+def test_a_step_near_an_end_of_the_log(at: tuple[int, ...], tmp_path: Path, steady) -> None:
+    """The last of 139 epochs is 138; at an end the rate is that of the neighbours on one side."""
+    clock = Clock(steps=tuple((epoch, 1e-3) for epoch in at), in_rates=True)
+    assert largest_difference(tight(written(tmp_path / "log", clock)), steady[0, 0]) < 0.3
+
+
+@pytest.mark.parametrize("epochs", [3, 4, 5, 10, 11, 12, 20, 21, 22, 40])
+def test_a_step_anywhere_in_a_short_log_is_found_in_its_rates(epochs: int) -> None:
+    time, steady, sigma = np.arange(epochs, dtype=float), np.full(epochs, 150.0), np.full(epochs, 0.1)
+    for at in range(epochs):
+        step = np.where(np.arange(epochs) == at, MILLISECOND, 0.0)
+        np.testing.assert_array_equal(_spikes(time, steady + step, sigma), step)
+
+
+@pytest.mark.parametrize("epochs", [0, 1, 2])
+def test_of_two_rates_neither_lies_beyond_the_other(epochs: int) -> None:
+    values = np.linspace(0.0, MILLISECOND, epochs)
+    np.testing.assert_array_equal(_spikes(values, values, np.ones(epochs)), np.zeros(epochs))
+
+
+def test_a_rate_that_changes_steadily_has_no_steps_at_the_ends_of_the_log() -> None:
+    """By 0.9 m/s in a second, below what a clock may do; the neighbours at an end are 5 s away in the median."""
+    time = np.arange(50.0)
+    assert not _spikes(time, 0.9 * time, np.full(50, 0.1)).any()
 
 
 def test_where_satellites_are_too_few_for_a_fix_their_ranges_show_the_step(tmp_path: Path) -> None:

@@ -9,25 +9,44 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from spoofgym.command_line import Parser, count_or_none, seed_number
+from spoofgym.program import program
 from tests.stress import arguments, kills, logs, steps
+from tests.stress.progress import Progress
+
+Fuzz = Callable[[int, int], list[str]]
+"""Makes tries from a seed; the broken promises."""
 
 
-def main(argv: list[str] | None = None) -> int:
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="python -m tests.stress",
+        description="Try to break the promises of docs/reliability.md. Exit status: 0 where all held, 1 at the first "
+        "that is broken, 2 for a wrong option, 130 after Ctrl-C.",
+    )
+    add = result.add_argument
+    add("--seed", type=seed_number, default=0, metavar="S", help="from which every try follows (default: %(default)s)")
+    add("--steps", type=count_or_none, default=100_000, metavar="N",
+        help="steps of lanes in fuzzed games (default: %(default)s)")
+    add("--arguments", type=count_or_none, default=10_000, metavar="N",
+        help="hostile arguments (default: %(default)s)")
+    add("--logs", type=count_or_none, default=200, metavar="N", help="mutated logs (default: %(default)s)")
+    add("--kills", type=count_or_none, default=4, metavar="N",
+        help="trainings killed and resumed (default: %(default)s)")
+    return result
+
+
+@program
+def main(command_line: Sequence[str] | None = None) -> int:
     """Run the program; the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tests.stress", description=__doc__)
-    parser.add_argument("--seed", type=int, default=0, help="of all tries (default 0)")
-    parser.add_argument("--steps", type=int, default=100_000, help="steps of lanes in fuzzed games (default 100,000)")
-    parser.add_argument("--arguments", type=int, default=10_000, help="hostile arguments (default 10,000)")
-    parser.add_argument("--logs", type=int, default=200, help="mutated logs (default 200)")
-    parser.add_argument("--kills", type=int, default=4, help="trainings killed and resumed (default 4)")
-    given = parser.parse_args(argv)
+    given = parser().parse_args(command_line)
     with tempfile.TemporaryDirectory(prefix="spoofgym-stress-") as scratch:
         folder = Path(scratch)
-        kinds: tuple[tuple[str, int, int, Callable[[int, int], list[str]]], ...] = (
+        kinds: tuple[tuple[str, int, int, Fuzz], ...] = (
             ("steps of lanes", given.steps, 2_000, steps.fuzz),
             ("hostile arguments", given.arguments, 500, arguments.fuzz),
             ("mutated logs", given.logs, 10, lambda seed, tries: logs.fuzz(seed, tries, folder)),
@@ -39,25 +58,20 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def _try(name: str, total: int, chunk: int, fuzz: Callable[[int, int], list[str]], seed: int) -> bool:
+def _try(name: str, total: int, chunk: int, fuzz: Fuzz, seed: int) -> bool:
     """Make ``total`` tries of one kind, a chunk at a time, each with a seed of its own; whether the promises held."""
-    begun, made = time.monotonic(), 0
+    progress, made = Progress(name, total, sys.stdout), 0
     while made < total:
         tries = min(chunk, total - made)
         broken = fuzz(seed + made, tries)
         made += tries
         if broken:
-            print(f"{name}: {made:,} tried, a promise is broken", flush=True)
+            progress.end(f"{made:,} tried, a promise is broken")
             print(f"  seed {seed + made - tries}: {broken[0]}", flush=True)
             return False
-        _tell(f"{name}: {made:,} of {total:,} tried", end="\r" if sys.stdout.isatty() else None)
-    print(f"{name}: {made:,} tried, every promise held ({time.monotonic() - begun:.0f} s)", flush=True)
+        progress.tell(made)
+    progress.end(f"{made:,} tried, every promise held")
     return True
-
-
-def _tell(text: str, end: str | None) -> None:
-    if end is not None:
-        print(text, end=end, flush=True)
 
 
 if __name__ == "__main__":

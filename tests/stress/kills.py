@@ -7,7 +7,6 @@ one text each.
 from __future__ import annotations
 
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -82,9 +81,10 @@ def _leg(program: str, path: Path, moment: float) -> int | None:
     try:
         return process.wait(timeout=moment)
     except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGKILL)
-        process.wait()
         return None
+    finally:  # after Ctrl-C, too, so that no training goes on alone
+        process.kill()
+        process.wait()
 
 
 def _uninterrupted(program: str, folder: Path) -> tuple[dict[str, object], float]:

@@ -231,6 +231,26 @@ def test_a_run_that_has_ended_is_lengthened_by_name_only(name, uninterrupted, tm
     assert result(path)[CHECKPOINT_FILE] != expected[CHECKPOINT_FILE]
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "valid"),
+    [("--seed", "4294967296", "from 0 to 4294967295"), ("--steps", "1e30", "1,000,000,000,000 or less")],
+)
+@pytest.mark.parametrize("program", [spoofer, defender])
+def test_a_seed_or_a_length_that_no_training_takes_is_refused(program, option, value, valid, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        program.main([option, value, "--out", str(tmp_path / "run")])
+    assert ended.value.code == 2
+    assert f"{option}: expected a whole number" in (line := capsys.readouterr().err)
+    assert f"{valid}, got '{value}'" in line
+
+
+@pytest.mark.parametrize("name", ["spoofer", "defender"])
+def test_the_largest_seed_trains(name, tmp_path):
+    program, run = PROGRAMS[name]
+    RunFolder(tmp_path / "run", "train.x", *TYPES[program]).begin(replace(run, seed=2**32 - 1, steps=1))
+    assert resume(program, tmp_path / "run") == 0
+
+
 @pytest.mark.parametrize("program", [spoofer, defender])
 def test_where_no_run_is_there_is_none_to_resume(program, tmp_path, capsys):
     assert resume(program, tmp_path / "nowhere") == 2
@@ -310,8 +330,10 @@ def changed_config(*keys, value):
         changed_config("environment", value=None),
         changed_config("seed", value=-1),
         changed_config("seed", value=True),
+        changed_config("seed", value=2**32),
         changed_config("steps", value=0),
         changed_config("steps", value=1e99),
+        changed_config("steps", value=10**13),
         lambda content: content.pop("steps"),
         lambda content: content["learner"].pop("epochs"),
     ],
@@ -326,6 +348,38 @@ def test_a_config_that_says_nonsense_is_named_in_one_line(name, change, tmp_path
     assert resume(program, path) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"error: {path / CONFIG_FILE} is damaged: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "value", "reason"),
+    [
+        ("spoofer", "scenario", "foo", "unknown scenario 'foo'"),
+        ("spoofer", "scenario", "recorded:/nowhere", "/nowhere"),
+        ("spoofer", "detector", "foo", "unknown detector 'foo'"),
+        ("spoofer", "shadow", "foo", "unknown scenario 'foo'"),
+        ("defender", "scenario", "foi-drive:colour=red", "colour"),
+        ("defender", "detectors", ["snapshot", "foo"], "unknown detector 'foo'"),
+        ("defender", "attacks", "foo", "unknown attack"),
+    ],
+)
+def test_a_part_of_a_run_that_cannot_be_built_is_told_with_its_file(name, key, value, reason, tmp_path, capsys):
+    path = tmp_path / "run"
+    program = begun(path, name)
+    content = json.loads((path / CONFIG_FILE).read_text())
+    content["environment"][key] = value
+    (path / CONFIG_FILE).write_text(json.dumps(content))
+    assert resume(program, path) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"error: {path / CONFIG_FILE}: ")
+    assert reason in line
+
+
+@pytest.mark.parametrize("program", [spoofer, defender])
+def test_a_part_of_a_new_run_that_cannot_be_built_has_no_file(program, tmp_path, capsys):
+    assert program.main(["--scenario", "foo", "--out", str(tmp_path / "run")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "unknown scenario 'foo'" in line
+    assert CONFIG_FILE not in line
 
 
 def of_learner(key, change):

@@ -1,0 +1,5 @@
+"""A program that tries to break the promises of docs/reliability.md: ``python -m tests.stress``."""
+
+from spoofgym.program import quiet_start
+
+quiet_start()
