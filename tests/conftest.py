@@ -2,15 +2,22 @@
 
 import os
 import shutil
+import signal
 import stat
+import subprocess
 import tempfile
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        # a shell that runs the suite in the background lets it ignore Ctrl-C, and all programs that it starts, too
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     # the width of the terminal in which the tests run, which workers inherit, is not the width that a test means
     os.environ.pop("COLUMNS", None)
     # a worker of xdist inherits the folders of the process that started it
@@ -29,6 +36,21 @@ def package_copy(tmp_path: Path) -> Path:
     for path in (copy, *copy.rglob("*")):
         path.chmod(path.stat().st_mode | stat.S_IWUSR)
     return copy
+
+
+@pytest.fixture
+def child() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Begins programs as `subprocess.Popen` does; none of them outlives its test."""
+    begun: list[subprocess.Popen[str]] = []
+
+    def begin(command: list[str], **options: Any) -> subprocess.Popen[str]:
+        begun.append(subprocess.Popen(command, text=True, **options))
+        return begun[-1]
+
+    yield begin
+    for process in begun:
+        process.kill()
+        process.communicate()
 
 
 def _in_the_test_cache(config: pytest.Config) -> Path | None:

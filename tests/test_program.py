@@ -119,11 +119,9 @@ def test_a_closed_output_is_no_error():
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_ctrl_c_is_one_line():
+def test_ctrl_c_is_one_line(child):
     code = WRITER.replace("for line in range(100_000):", "while True:").replace("print(line)", "time.sleep(0.01)")
-    process = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    process = child([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     process.stdout.readline()
     time.sleep(0.1)

@@ -65,14 +65,10 @@ def test_a_wrong_option_is_one_line(option, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("delay", [None, 0.5])
-def test_ctrl_c_is_one_line(delay):
+def test_ctrl_c_is_one_line(delay, child):
     """At the start of the imports, and in the middle of a game."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.stress", "--steps", "1e9"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    command = [sys.executable, "-m", "tests.stress", "--steps", "1e9"]
+    process = child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     if delay is None:
         time.sleep(1.0)  # the interpreter has begun, torch is not there yet

@@ -192,10 +192,10 @@ def test_equal_seeds_train_equal_policies(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_interruption_leaves_a_usable_policy(tmp_path):
+def test_interruption_leaves_a_usable_policy(tmp_path, child):
     folder = tmp_path / "interrupted"
     command = [sys.executable, "-m", "train.defender", *SHORT, "--steps", "100000000", "--out", str(folder)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = child(command, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 600
     while not (folder / CHECKPOINT_FILE).exists() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.2)

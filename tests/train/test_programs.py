@@ -105,10 +105,10 @@ def test_a_run_can_be_resumed(run, tmp_path):
 
 
 @pytest.mark.slow
-def test_interruption_leaves_a_usable_policy(tmp_path):
+def test_interruption_leaves_a_usable_policy(tmp_path, child):
     folder = tmp_path / "interrupted"
     command = [sys.executable, "-m", "train.spoofer", *SHORT, "--steps", "100000000", "--out", str(folder)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = child(command, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 600
     while not list(folder.rglob("events.*")) and time.monotonic() < deadline:
         time.sleep(0.2)
