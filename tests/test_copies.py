@@ -1,7 +1,6 @@
 """A copy of a simulation in mid-game goes on as the original does, bit for bit: every detector, attack and response."""
 
 import copy
-import inspect
 import pickle
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -14,7 +13,7 @@ from numba import typeof
 
 from spoofgym.attacks import ATTACKS, make_attack
 from spoofgym.attacks.base import Attack
-from spoofgym.detectors import DETECTORS, make_detector
+from spoofgym.detectors import DETECTORS
 from spoofgym.detectors.base import Detector
 from spoofgym.immutable import Immutable
 from spoofgym.parallel import RunSlices
@@ -23,6 +22,7 @@ from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario, SimulatedScenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
+from tests.golden.parts import ready, spelled
 
 COPY: dict[str, Callable[[Any], Any]] = {
     "deepcopy": copy.deepcopy,
@@ -33,21 +33,6 @@ TIGHT = "kujur-flight:horizon=24,onset=120"
 ROBOT = "song-robot:horizon=24"
 GAMES = [(text, fidelity) for text in (LOOSE, TIGHT) for fidelity in ("linear", "strapdown")] + [(ROBOT, "linear")]
 BEFORE, AFTER = 9, 12
-QUIET = 1e8
-"""A threshold that no clean statistic exceeds, so that nothing need be calibrated."""
-REQUIRED = {"rate": "0.5", "jump": "2", "radius": "20", "delay": "3", "d": "1.2", "azimuth": "90", "attack": "ramp:0.5"}
-"""Values for options of attacks that have no default."""
-
-
-def ready(name: str, threshold: float = QUIET) -> Detector:
-    """A detector by its name, with a threshold that need not be calibrated."""
-    detector = make_detector(name)
-    for part in (*detector.members, detector):
-        if part.lacks_slope:
-            part.set_slope(0.1)
-        if part.threshold is None:
-            part.set_threshold(threshold if part is detector else 1.0)
-    return detector
 
 
 def fitting(part: Detector | Response) -> list[str]:
@@ -113,13 +98,6 @@ def arrays_in(part: Any, seen: set[int]) -> Iterator[np.ndarray]:
     inner = list(part) if isinstance(part, list | tuple | set) else list(getattr(part, "__dict__", {}).values())
     for item in [*inner, *(part.values() if isinstance(part, dict) else ())]:
         yield from arrays_in(item, seen)
-
-
-def spelled(name: str) -> str:
-    """The specification of an attack, with values for options that have no default."""
-    parameters = inspect.signature(ATTACKS[name]).parameters.values()
-    needed = [parameter.name for parameter in parameters if parameter.default is parameter.empty]
-    return name + "".join(f"{',' if place else ':'}{key}={REQUIRED[key]}" for place, key in enumerate(needed))
 
 
 def test_every_detector_fits_a_scenario() -> None:

@@ -1,0 +1,129 @@
+"""Make and compare golden episodes.
+
+    python -m tests.golden make runs/golden               # before a change, on this machine
+    python -m tests.golden compare runs/golden            # after it: bit for bit
+    python -m tests.golden commit                         # the arrays of the repository, and their tolerances
+
+`commit` plays every episode again in other arithmetic (code of OpenBLAS, NumPy and numba for older processors) and with
+all random numbers moved by one unit in the last place, and allows each quantity ten times the largest difference.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spoofgym import streams
+from tests.golden import store
+from tests.other_kernels import other_kernels
+
+MARGIN = 10.0
+VARIATIONS: dict[str, dict[str, str]] = {
+    "oldest processor": other_kernels(),
+    "another BLAS": {"OPENBLAS_CORETYPE": "Haswell"},
+    "moved up": {"GOLDEN_NUDGE": "1"},
+    "moved down": {"GOLDEN_NUDGE": "-1"},
+}
+
+
+class Nudged(np.random.Generator):
+    """A generator whose normal numbers are moved by one unit in the last place, up or down."""
+
+    toward = np.inf
+
+    def standard_normal(self, *arguments: Any, **options: Any) -> Any:
+        """As that of the base class, moved."""
+        drawn = super().standard_normal(*arguments, **options)
+        if options.get("out") is not None:
+            return np.nextafter(drawn, self.toward, out=options["out"])
+        return np.nextafter(drawn, self.toward)
+
+
+def nudge(direction: float) -> None:
+    """Move the random numbers of all streams from now on."""
+    Nudged.toward = direction * np.inf
+    streams._generator = lambda sequence: Nudged(np.random.SFC64(sequence))  # type: ignore[assignment]
+
+
+def make(folder: Path) -> None:
+    """Play all episodes and write them to a folder."""
+    if "GOLDEN_NUDGE" in os.environ:
+        nudge(float(os.environ["GOLDEN_NUDGE"]))
+    kinds = store.KINDS if folder == store.FOLDER else store.ALL_KINDS
+    for kind, episodes in kinds.items():
+        store.write(folder, kind, {name: play() for name, play in episodes().items()})
+
+
+def compare(folder: Path) -> int:
+    """Play all episodes and compare them with a folder, bit for bit; the number that differ."""
+    differing = 0
+    for kind, episodes in store.ALL_KINDS.items():
+        expected = store.read(folder, kind)
+        for name, play in episodes().items():
+            told = store.differences(expected.pop(name, {}), play())
+            differing += bool(told)
+            if told:
+                print(f"{name}\n  " + "\n  ".join(told))
+        differing += len(expected)
+        for name in expected:
+            print(f"{name}\n  is played no more")
+    print("all golden episodes are equal" if not differing else f"{differing} golden episodes differ")
+    return differing
+
+
+def commit() -> None:
+    """Make the arrays of the repository and measure their tolerances."""
+    make(store.FOLDER)
+    allowed: dict[str, dict[str, float]] = {}
+    for label, variables in VARIATIONS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, "-m", "tests.golden", "make", folder]
+            subprocess.run(command, env={**os.environ, **variables}, check=True)
+            largest = _widen(allowed, Path(folder))
+        print(f"{label}: largest difference {largest:.3g}")
+    kept = {name: {key: float(f"{gap:.2g}") for key, gap in gaps.items()} for name, gaps in sorted(allowed.items())}
+    store.TOLERANCES.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n")
+
+
+def _widen(allowed: dict[str, dict[str, float]], folder: Path) -> float:
+    """Allow what a variation made of the episodes; the largest difference of all."""
+    largest = 0.0
+    for kind in store.KINDS:
+        varied = store.read(folder, kind)
+        for name, arrays in store.read(store.FOLDER, kind).items():
+            for key, array in arrays.items():
+                gap = store.distance(array, varied[name][key])
+                largest = max(largest, gap)
+                if not np.isfinite(gap):
+                    raise SystemExit(f"{name}: {key}: a variation changes what must be equal: choose another episode")
+                if gap:
+                    gaps = allowed.setdefault(name, {})
+                    gaps[key] = max(gaps.get(key, 0.0), MARGIN * gap)
+    return largest
+
+
+def main() -> int:
+    """Do what the command line asks; its exit status."""
+    parser = argparse.ArgumentParser("python -m tests.golden", description="Make and compare golden episodes.")
+    parser.add_argument("command", choices=("make", "compare", "commit"))
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("runs/golden"), help="default: %(default)s")
+    given = parser.parse_args()
+    if given.command == "compare":
+        return min(compare(given.folder), 1)
+    if given.command == "make":
+        make(given.folder)
+    else:
+        commit()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

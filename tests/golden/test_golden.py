@@ -1,0 +1,22 @@
+"""What a short seeded game computes is what it computed when the golden arrays were made."""
+
+from functools import cache
+
+import pytest
+
+from tests.golden import store
+
+EPISODES = [(kind, name) for kind, episodes in store.KINDS.items() for name in episodes()]
+EXPECTED = cache(store.read)
+
+
+@pytest.mark.parametrize(("kind", "name"), EPISODES)
+def test_golden(kind: str, name: str) -> None:
+    expected = EXPECTED(store.FOLDER, kind)[name]
+    found = store.KINDS[kind]()[name]()
+    assert store.differences(expected, found, store.tolerances().get(name, {})) == []
+
+
+def test_no_golden_array_is_left_over() -> None:
+    for kind, episodes in store.KINDS.items():
+        assert store.read(store.FOLDER, kind).keys() == episodes().keys()
