@@ -1,8 +1,9 @@
 """What compiled code is made of, as one digest: equal digests, equal code.
 
 numba compiles into a kernel its own code and, as constants, the globals that it names: numbers, arrays and other
-kernels, with what these name in turn. All of it is read from memory and not from files. So it does not matter in which
-file a thing stands, nor whether that file has been changed since the program began.
+kernels, with what these name in turn. All of it is read from memory and not from files, so it does not matter whether a
+file has been changed since the program began. The name of each function's module counts: compiled code imports the
+modules of the functions it was made of, so it is lost when one of them moves.
 """
 
 from __future__ import annotations
@@ -43,9 +44,11 @@ def digest(content: object) -> str:
 
 
 def _fields(argument: Any) -> object:
-    """Names of the fields of a named tuple, and of those within: numba's name of the type leaves them out."""
+    """Where a named tuple is defined, and its fields, with those within: numba's name of the type leaves them out."""
     members: Any = argument if isinstance(argument, types.BaseTuple) else ()
-    return (getattr(argument, "fields", None), [_fields(each) for each in members])
+    defined: Any = getattr(argument, "instance_class", None)
+    place = None if defined is None else (defined.__module__, defined.__qualname__)
+    return (place, getattr(argument, "fields", None), [_fields(each) for each in members])
 
 
 def _kernel(kernel: Dispatcher, callers: tuple[object, ...]) -> object:
@@ -62,6 +65,7 @@ def _function(function: Any, callers: tuple[object, ...]) -> object:
     named = [(name, function.__globals__[name]) for name in _globals(code) if name in function.__globals__]
     closed = zip(code.co_freevars, (cell.cell_contents for cell in function.__closure__ or ()), strict=True)
     return (
+        function.__module__,
         _code(code),
         _value(function.__defaults__, code, callers),
         [(name, _value(value, code, callers)) for name, value in [*named, *closed]],

@@ -81,6 +81,24 @@ def test_what_is_not_compiled_does_not(house, change):
     assert identity(house(file="elsewhere.py")) == identity(house())
 
 
+def test_a_function_that_moves_to_another_module_changes_it(house, monkeypatch):
+    """Compiled code imports the modules of the functions that it was made of."""
+    here, there = house(), house()
+    monkeypatch.setattr(there.py_func.__globals__["far"].py_func, "__module__", "spoofgym.moved")
+    assert identity(there) != identity(here)
+
+
+def test_a_named_tuple_that_moves_to_another_module_changes_the_variant():
+    def signature(module):
+        class Point(NamedTuple):
+            x: float
+
+        Point.__module__ = module
+        return (numba.typeof((Point(1.0),)),)
+
+    assert variant(signature("spoofgym.here"), "cpu") != variant(signature("spoofgym.there"), "cpu")
+
+
 def test_a_global_without_a_digest_is_refused_by_name(house):
     with pytest.raises(TypeError, match=r"^near: .* uses a global of type list cannot be kept on disk"):
         identity(house(("OFFSET = 1", "OFFSET = [1]")))

@@ -141,7 +141,7 @@ def test_a_kernel_can_be_pickled():
 FALL = """
 import os, sys
 import numpy as np, spoofgym.geodesy as geodesy
-from spoofgym.navigation.mechanization import mechanize
+from spoofgym.mechanization import mechanize
 attitude, velocity, position = np.eye(3), np.zeros(3), np.array([0.8, 0.2, 100.0])
 mechanize(attitude, velocity, position, np.zeros(3), np.zeros(3), 1e-6, np.zeros(3))
 print(geodesy.normal_gravity(0.8, 100.0), -velocity[2] / 1e-6)
