@@ -13,18 +13,18 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import position_difference
 from spoofgym.immutable import Immutable
-from spoofgym.navigation.adaptation import Adaptation
-from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Spoof
-from spoofgym.navigation.linear import LinearNavigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
-from spoofgym.navigation.loose import StrapdownNavigator
-from spoofgym.navigation.own_covariance import OwnCovarianceNavigator
-from spoofgym.navigation.strapdown_model import strapdown_model
-from spoofgym.navigation.tight_model import TightModel
+from spoofgym.navigation.loose.adaptation import Adaptation
+from spoofgym.navigation.loose.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
+from spoofgym.navigation.loose.own_gains import OwnCovarianceNavigator
+from spoofgym.navigation.loose.shared_gains import LinearNavigator
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
+from spoofgym.navigation.loose.strapdown_model import strapdown_model
+from spoofgym.navigation.loose.warm_start import COLOUR, RANGES, WarmStart, cold_start, num_joint, warm_up
+from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.navigation.warm_start import COLOUR, RANGES, WarmStart, cold_start, num_joint, warm_up
 from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade

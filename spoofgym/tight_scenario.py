@@ -13,9 +13,8 @@ from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
-from spoofgym.navigation.strapdown_model import strapdown_model
-from spoofgym.navigation.tight import TightNavigator
-from spoofgym.navigation.tight_model import (
+from spoofgym.navigation.loose.strapdown_model import strapdown_model
+from spoofgym.navigation.tight.model import (
     TightDynamics,
     TightModel,
     bias_variance,
@@ -24,9 +23,10 @@ from spoofgym.navigation.tight_model import (
     tight_dynamics,
     tight_model,
 )
-from spoofgym.navigation.tight_own import TightOwnNavigator
-from spoofgym.navigation.tight_states import BIAS, OBSERVABLES
-from spoofgym.navigation.tight_strapdown import TightStrapdownNavigator
+from spoofgym.navigation.tight.own_gains import TightOwnNavigator
+from spoofgym.navigation.tight.shared_gains import TightNavigator
+from spoofgym.navigation.tight.states import BIAS, OBSERVABLES
+from spoofgym.navigation.tight.strapdown import TightStrapdownNavigator
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices

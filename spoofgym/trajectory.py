@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from spoofgym import validation
 from spoofgym.geodesy import normal_gravity
 from spoofgym.kernels import njit
-from spoofgym.navigation.mechanization import advance_position, attitude_matrix, invert_mechanization
+from spoofgym.mechanization import advance_position, attitude_matrix, invert_mechanization
 from spoofgym.validation import written
 
 MOST_STEPS = 20_000_000

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spoofgym.geodesy import EARTH_RATE, position_difference
-from spoofgym.navigation.mechanization import euler_angles
+from spoofgym.mechanization import euler_angles
 from spoofgym.scenarios.liu_flight import LIU_END, liu_trajectory
 from spoofgym.trajectory import Accelerate, Climb, Straight, Turn, coordinated_bank, fly, smooth_step, smooth_step_rate
 

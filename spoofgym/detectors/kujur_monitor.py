@@ -9,8 +9,8 @@ from spoofgym.detectors.cpi import AXES, UP, Cpi, unit_vector
 from spoofgym.detectors.ensemble import Ensemble
 from spoofgym.detectors.separation_bank import DEFAULT_P_FA, DEFAULT_P_MD, DEFAULT_WINDOW, SeparationBank
 from spoofgym.navigation.interface import Epoch
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tracking_response import projected_response
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.tracking_response import projected_response
 from spoofgym.specification import spell
 
 DEFAULT_P_MD_CPI = 1e-7

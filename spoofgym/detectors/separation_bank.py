@@ -8,10 +8,10 @@ from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.separation_theory import protection_level, separation_threshold
-from spoofgym.navigation.coasting import coasting_tables
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
-from spoofgym.navigation.separation import CoastingWindows
+from spoofgym.navigation.separation.coasting import coasting_tables
+from spoofgym.navigation.separation.windows import CoastingWindows
 from spoofgym.specification import spell
 
 DEFAULT_WINDOW = 60
@@ -34,11 +34,12 @@ class SeparationBank(ThresholdDetector):
     ``direction=horizontal`` tests east and north, each with half of P_FA and P_MD, and puts both levels together by the
     root of their squares, which is conservative (ours).
 
-    All windows are followed at once (`spoofgym.navigation.separation`). Where the gains are shared their variances are
-    tabulated; where every run has a covariance of its own they are the run's, what it has left out or taken back
-    included, and an epoch that the filter does not use is separated as if it were. What was taken back is gone from the
-    windows, too. A filter that was reset to its ranges separates from the coasting by the jump, too. In the strapdown
-    fidelity Φ is that along the truth. Where innovations before epoch 0 are drawn, these epochs are as epoch 0.
+    All windows are followed at once (`spoofgym.navigation.separation.windows`). Where the gains are shared their
+    variances are tabulated; where every run has a covariance of its own they are the run's, what it has left out or
+    taken back included, and an epoch that the filter does not use is separated as if it were. What was taken back is
+    gone from the windows, too. A filter that was reset to its ranges separates from the coasting by the jump, too. In
+    the strapdown fidelity Φ is that along the truth. Where innovations before epoch 0 are drawn, these epochs are as
+    epoch 0.
 
     Args:
         n: windows that are open at once, which is also their length in epochs.

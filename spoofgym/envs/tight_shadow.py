@@ -16,11 +16,12 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
-from spoofgym.navigation import kalman, tight_filter
+from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.position_domain import project_onto_position
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tight_states import CLOCK, NUM_COMMON, PER_SATELLITE, VELOCITY
+from spoofgym.navigation.tight import kalman as tight_filter
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.states import CLOCK, NUM_COMMON, PER_SATELLITE, VELOCITY
 from spoofgym.parallel import RunSlices
 
 GRAIN = 512

@@ -24,7 +24,7 @@ from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
 from spoofgym.evaluation.stanford import draw_side_by_side
-from spoofgym.navigation.tight import TightNavigator
+from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error

@@ -15,8 +15,8 @@ from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.geodesy import position_difference
 from spoofgym.kernels import njit
-from spoofgym.navigation.mechanization import mechanize
-from spoofgym.scenarios.log import interpolate
+from spoofgym.logs.log import interpolate
+from spoofgym.mechanization import mechanize
 from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.simulation import Simulation
 from spoofgym.validation import written

@@ -21,10 +21,10 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.monte_carlo import horizontal
 from spoofgym.geodesy import position_difference
+from spoofgym.logs.fix_rows import UNMEASURED_SIGMA
+from spoofgym.logs.log import Fixes, interpolate, read_log
+from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.program import do_all, give_json, program
-from spoofgym.scenarios.fix_rows import UNMEASURED_SIGMA
-from spoofgym.scenarios.log import Fixes, interpolate, read_log
-from spoofgym.scenarios.range_epochs import RangeEpochs
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges

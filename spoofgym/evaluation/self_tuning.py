@@ -16,9 +16,9 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.profiles import Ramp
 from spoofgym.command_line import Parser, count, seed_number
-from spoofgym.navigation.adaptation import GUARDS
-from spoofgym.navigation.adaptive import AdaptiveNavigator
 from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.loose.adaptation import GUARDS
+from spoofgym.navigation.loose.adaptive import AdaptiveNavigator
 from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.shadmehri_flight import NOISES, SIGMA

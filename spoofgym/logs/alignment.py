@@ -12,11 +12,11 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.geodesy import displace, normal_gravity
-from spoofgym.navigation.mechanization import attitude_matrix
-from spoofgym.scenarios.fix_rows import DEFAULT_SIGMA, UNKNOWN_SIGMA
-from spoofgym.scenarios.log import Fixes, Log, velocity_of
-from spoofgym.scenarios.mounting import interval_means
-from spoofgym.scenarios.table import seconds
+from spoofgym.logs.fix_rows import DEFAULT_SIGMA, UNKNOWN_SIGMA
+from spoofgym.logs.log import Fixes, Log, velocity_of
+from spoofgym.logs.mounting import interval_means
+from spoofgym.logs.table import seconds
+from spoofgym.mechanization import attitude_matrix
 
 MIN_SPEED = 5.0
 """Slowest speed whose course is trusted as heading, whatever the receiver, m/s."""

@@ -15,8 +15,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.constants import speed_of_light
 
 from spoofgym.arrays import Flags, Floats
-from spoofgym.scenarios.range_fixes import RangeSolution, between_fixes, solve_ranges
-from spoofgym.scenarios.ranges_log import Ranges
+from spoofgym.logs.range_fixes import RangeSolution, between_fixes, solve_ranges
+from spoofgym.logs.ranges_log import Ranges
 from spoofgym.sensors.ranging import DrawnErrors, pseudoranges
 
 STEP = 8.0

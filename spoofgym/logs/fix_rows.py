@@ -15,7 +15,7 @@ from scipy.ndimage import median_filter
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import position_difference
-from spoofgym.scenarios.log_warning import warn
+from spoofgym.logs.log_warning import warn
 
 UNKNOWN_SIGMA = 99.0
 """1 sigma from which on a number stands for "unknown", m and m/s: receivers write 99.99, 999, 9999, 4294967.295 or 1e9,

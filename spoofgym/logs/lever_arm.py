@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from spoofgym.arrays import Floats
-from spoofgym.scenarios.log import Log
-from spoofgym.scenarios.mounting import interval_means
+from spoofgym.logs.log import Log
+from spoofgym.logs.mounting import interval_means
 
 HALF = 0.05
 """Time to either side of a fix over which the angular rate is averaged, s."""

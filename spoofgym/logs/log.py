@@ -15,10 +15,10 @@ from scipy.interpolate import CubicHermiteSpline
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.scenarios.fix_rows import known_sigmas, most_wild, usable_rows
-from spoofgym.scenarios.mounting import find_delay, find_mounting
-from spoofgym.scenarios.notes import ENU_OF_NED, Notes
-from spoofgym.scenarios.table import TIMES, check_increasing, has_table, read_table, seconds, table_path
+from spoofgym.logs.fix_rows import known_sigmas, most_wild, usable_rows
+from spoofgym.logs.mounting import find_delay, find_mounting
+from spoofgym.logs.notes import ENU_OF_NED, Notes
+from spoofgym.logs.table import TIMES, check_increasing, has_table, read_table, seconds, table_path
 
 IMU_COLUMNS = ("t_s", "gx_radps", "gy_radps", "gz_radps", "ax_mps2", "ay_mps2", "az_mps2")
 POSITION_COLUMNS = ("t_s", "lat_deg", "lon_deg", "h_m")

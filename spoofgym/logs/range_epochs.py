@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.scenarios.clock_steps import without_steps
-from spoofgym.scenarios.log import Fixes, Log
-from spoofgym.scenarios.range_fixes import (
+from spoofgym.logs.clock_steps import without_steps
+from spoofgym.logs.log import Fixes, Log
+from spoofgym.logs.range_fixes import (
     along_fixes,
     between_fixes,
     check_solved,
@@ -18,8 +18,8 @@ from spoofgym.scenarios.range_fixes import (
     range_delay,
     solve_ranges,
 )
-from spoofgym.scenarios.ranges_log import Ranges, correct, read_ranges
-from spoofgym.scenarios.table import has_table, seconds
+from spoofgym.logs.ranges_log import Ranges, correct, read_ranges
+from spoofgym.logs.table import has_table, seconds
 from spoofgym.sensors.geometry import SatelliteGeometry
 
 UNSTEADY = 0.1

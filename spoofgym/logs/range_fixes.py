@@ -11,10 +11,10 @@ from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.scenarios.log import Fixes, Log
-from spoofgym.scenarios.mounting import NO_RANGE_DELAY, find_delay
-from spoofgym.scenarios.ranges_log import CorrectedRanges, Ranges, correct, read_ranges
-from spoofgym.scenarios.table import has_table
+from spoofgym.logs.log import Fixes, Log
+from spoofgym.logs.mounting import NO_RANGE_DELAY, find_delay
+from spoofgym.logs.ranges_log import CorrectedRanges, Ranges, correct, read_ranges
+from spoofgym.logs.table import has_table
 from spoofgym.sensors.least_squares import Fix, VelocityFix, fix, velocity_fix
 
 FALSE_ALARM = 1e-3

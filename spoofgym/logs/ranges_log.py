@@ -15,7 +15,7 @@ import numpy as np
 from scipy.constants import speed_of_light
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.scenarios.table import TIMES, read_table, seconds, table_path
+from spoofgym.logs.table import TIMES, read_table, seconds, table_path
 from spoofgym.sensors.ephemeris import Ephemeris, read_csv, time_between
 from spoofgym.sensors.geometry import SatelliteGeometry, lines_of_sight, received_states
 from spoofgym.sensors.ranging import troposphere_mapping

@@ -13,8 +13,8 @@ import numpy as np
 
 from spoofgym.arrays import Flags
 from spoofgym.geodesy import position_difference
-from spoofgym.scenarios.log import Fixes, Log, covered, interpolate
-from spoofgym.scenarios.log_warning import warn
+from spoofgym.logs.log import Fixes, Log, covered, interpolate
+from spoofgym.logs.log_warning import warn
 
 APART = 3.0
 """Median distance between fixes and reference that is too large, over the median sigma of the fixes."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.tight_model import TightModel
+from spoofgym.navigation.tight.model import TightModel
 
 INERTIAL_SOLUTION = "inertial solution"
 LINEAR_MODEL = "linear model"

@@ -9,12 +9,12 @@ from functools import partial
 from typing import Any
 
 from spoofgym import validation
+from spoofgym.logs.log_files import State, log_state
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.cache import ScenarioCache
 from spoofgym.scenarios.foi_drive import foi_drive
 from spoofgym.scenarios.kujur_flight import kujur_flight
 from spoofgym.scenarios.liu_flight import liu_flight
-from spoofgym.scenarios.log_files import State, log_state
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.shadmehri_flight import shadmehri_flight
 from spoofgym.scenarios.song_robot import song_robot

@@ -9,13 +9,13 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.kernels import njit
+from spoofgym.mechanization import mechanize
 from spoofgym.navigation.divergence import FilterDivergedError, diverged_error
 from spoofgym.navigation.interface import Decision
-from spoofgym.navigation.loose import StrapdownNavigator
-from spoofgym.navigation.mechanization import mechanize
-from spoofgym.navigation.strapdown_model import StrapdownModel
-from spoofgym.navigation.tight_strapdown import TightStrapdownNavigator
-from spoofgym.navigation.warm_start import NUM_JOINT
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.warm_start import NUM_JOINT
+from spoofgym.navigation.tight.strapdown import TightStrapdownNavigator
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 

@@ -17,25 +17,25 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
+from spoofgym.logs.fix_rows import DEFAULT_SIGMA, UNMEASURED_SIGMA
+from spoofgym.logs.lever_arm import with_velocity_at_imu
+from spoofgym.logs.log import Log, read_log, velocity_of
+from spoofgym.logs.log_warning import warn
+from spoofgym.logs.range_epochs import range_epochs
+from spoofgym.logs.range_fixes import range_fixes
+from spoofgym.logs.reference import checked_reference
+from spoofgym.logs.table import seconds
 from spoofgym.navigation.facts import INERTIAL_SOLUTION
 from spoofgym.navigation.interface import Demands
-from spoofgym.navigation.loose import StrapdownNavigator
-from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.warm_start import ERROR, NUM_JOINT
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.navigation.warm_start import ERROR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import CleanRun, clean_run
-from spoofgym.scenarios.fix_rows import DEFAULT_SIGMA, UNMEASURED_SIGMA
-from spoofgym.scenarios.lever_arm import with_velocity_at_imu
 from spoofgym.scenarios.limits import NOISE_FACTORS
-from spoofgym.scenarios.log import Log, read_log, velocity_of
-from spoofgym.scenarios.log_warning import warn
-from spoofgym.scenarios.range_epochs import range_epochs
-from spoofgym.scenarios.range_fixes import range_fixes
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
 from spoofgym.scenarios.recorded_tight import RecordedRanges
-from spoofgym.scenarios.reference import checked_reference
-from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import grade as imu_grade
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams

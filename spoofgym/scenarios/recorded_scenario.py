@@ -13,15 +13,15 @@ from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.geodesy import displace, position_difference
+from spoofgym.logs.alignment import Alignment, align
+from spoofgym.logs.log import Log, covered, interpolate
+from spoofgym.logs.log_warning import warn
+from spoofgym.logs.table import seconds
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
-from spoofgym.scenarios.alignment import Alignment, align
 from spoofgym.scenarios.clean_run import CleanRun, CleanRunDivergedError, coast
-from spoofgym.scenarios.log import Log, covered, interpolate
-from spoofgym.scenarios.log_warning import warn
-from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.timeline import Timeline
 

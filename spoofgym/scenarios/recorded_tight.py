@@ -15,20 +15,20 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.closed_loop import mechanize_part
+from spoofgym.logs.range_epochs import RangeEpochs
+from spoofgym.logs.table import seconds
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
 from spoofgym.navigation.linear_model import ErrorDynamics
-from spoofgym.navigation.strapdown_model import StrapdownModel
-from spoofgym.navigation.tight_model import TightDynamics, TightModel, cold_covariance, tight_dynamics, tight_model
-from spoofgym.navigation.tight_replay import TightReplayNavigator
-from spoofgym.navigation.tight_states import BIAS, CLOCK
+from spoofgym.navigation.loose.kernels import mechanize_part
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.tight.model import TightDynamics, TightModel, cold_covariance, tight_dynamics, tight_model
+from spoofgym.navigation.tight.replay import TightReplayNavigator
+from spoofgym.navigation.tight.states import BIAS, CLOCK
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import TightCleanRun, tight_clean_run
-from spoofgym.scenarios.range_epochs import RangeEpochs
 from spoofgym.scenarios.recorded_scenario import RecordedScenario
-from spoofgym.scenarios.table import seconds
 from spoofgym.sensors.ranging import KUJUR, DrawnErrors, RangeErrors, pseudoranges
 from spoofgym.streams import RunStreams
 from spoofgym.tight_scenario import along, captured_ranges, disturbed_ranges

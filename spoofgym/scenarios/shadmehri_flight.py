@@ -11,7 +11,7 @@ import math
 from functools import lru_cache
 
 from spoofgym import validation
-from spoofgym.navigation.adaptation import Adaptation
+from spoofgym.navigation.loose.adaptation import Adaptation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import SimulatedScenario
 from spoofgym.scenarios.limits import SPEEDS

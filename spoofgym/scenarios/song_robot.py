@@ -17,12 +17,12 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
-from spoofgym.navigation.credible import ANCHORING, AuxiliaryRule, CredibleModel, CredibleNavigator
-from spoofgym.navigation.credible_filter import CredibleTuning, credible_linear_model, standing_start
+from spoofgym.navigation.credible.kalman import CredibleTuning, credible_linear_model, standing_start
+from spoofgym.navigation.credible.runs import ANCHORING, AuxiliaryRule, CredibleModel, CredibleNavigator
 from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT
+from spoofgym.navigation.loose.warm_start import COLOUR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS

@@ -7,7 +7,7 @@ from spoofgym.calibration import calibrated
 from spoofgym.detectors import Cpi, Windowed, cpi_theory, make_detector
 from spoofgym.detectors.cpi import kappa, projected, unit_vector
 from spoofgym.navigation.interface import Epoch, Innovation
-from spoofgym.navigation.tracking_response import projected_response, tracking_response
+from spoofgym.navigation.tight.tracking_response import projected_response, tracking_response
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 

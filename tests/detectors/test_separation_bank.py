@@ -7,10 +7,10 @@ from scipy import stats
 
 from spoofgym.detectors import SeparationBank, make_detector
 from spoofgym.detectors.separation_bank import DIRECTIONS
-from spoofgym.navigation import coasting
-from spoofgym.navigation.coasting import coasting_tables
 from spoofgym.navigation.interface import Decision, Demands, Epoch
-from spoofgym.navigation.tight_states import CLOCK, DRIFT, slot_states
+from spoofgym.navigation.separation import coasting
+from spoofgym.navigation.separation.coasting import coasting_tables
+from spoofgym.navigation.tight.states import CLOCK, DRIFT, slot_states
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 

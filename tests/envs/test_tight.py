@@ -17,7 +17,7 @@ from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import SpooferVectorEnv
-from spoofgym.navigation.tight_states import POSITION
+from spoofgym.navigation.tight.states import POSITION
 from spoofgym.scenarios import make_scenario
 from spoofgym.tight_scenario import TightScenario
 

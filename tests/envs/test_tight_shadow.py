@@ -14,7 +14,7 @@ from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.tight_shadow import TightShadowFilter
 from spoofgym.navigation.interface import Decision, Demands, Spoof
-from spoofgym.navigation.tight import TightNavigator
+from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario

@@ -10,9 +10,9 @@ import pytest
 
 from spoofgym.evaluation import recorded_ranges
 from spoofgym.evaluation.recorded_ranges import FILTERS, common, game_onsets, main, side_by_side
-from spoofgym.scenarios.log import Fixes
-from tests.scenarios.range_drive import write_drive
-from tests.scenarios.test_ranges_log import DRIFT
+from spoofgym.logs.log import Fixes
+from tests.logs.range_drive import write_drive
+from tests.logs.test_ranges_log import DRIFT
 from tests.scenarios.test_recorded import write_log
 
 PHONE = Path(__file__).parents[3] / "shared" / "data" / "car-phone-raw"

@@ -20,8 +20,8 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from tests.golden.parts import detectors_for, ready
 from tests.golden.simulations import LOOSE, RUNS, SEED, trace
-from tests.scenarios.range_drive import write_drive
-from tests.scenarios.test_ranges_log import FIRST
+from tests.logs.range_drive import write_drive
+from tests.logs.test_ranges_log import FIRST
 from tests.scenarios.test_recorded import write_log
 
 Arrays = dict[str, np.ndarray]

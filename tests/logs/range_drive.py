@@ -11,11 +11,11 @@ from scipy.constants import speed_of_light
 from scipy.spatial.transform import Rotation
 
 from spoofgym.geodesy import ecef_to_enu_rotation, geodetic_to_ecef
-from spoofgym.scenarios.ranges_log import CODE_SIGMA, RATE_SIGMA, zenith_troposphere
+from spoofgym.logs.ranges_log import CODE_SIGMA, RATE_SIGMA, zenith_troposphere
 from spoofgym.sensors.ephemeris import read_csv
 from spoofgym.sensors.ranging import troposphere_mapping
 from spoofgym.trajectory import Accelerate, Straight, Trajectory, Turn, fly
-from tests.scenarios.test_ranges_log import CLOCK, DRIFT, EARTH_RATE, FIRST, START, write_ephemeris
+from tests.logs.test_ranges_log import CLOCK, DRIFT, EARTH_RATE, FIRST, START, write_ephemeris
 
 RATE = 50
 DELAY = 0.3

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spoofgym.scenarios.alignment import align
-from spoofgym.scenarios.log import Log, read_log
+from spoofgym.logs.alignment import align
+from spoofgym.logs.log import Log, read_log
 from tests.scenarios.test_recorded import write_log
 
 

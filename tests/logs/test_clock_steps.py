@@ -9,14 +9,14 @@ import pytest
 from scipy.constants import speed_of_light
 
 from spoofgym.geodesy import position_difference
-from spoofgym.scenarios.clock_steps import MILLISECOND, _spikes, find_steps, without_steps
-from spoofgym.scenarios.range_fixes import solve_ranges
-from spoofgym.scenarios.ranges_log import read_ranges
+from spoofgym.logs.clock_steps import MILLISECOND, _spikes, find_steps, without_steps
+from spoofgym.logs.range_fixes import solve_ranges
+from spoofgym.logs.ranges_log import read_ranges
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
-from tests.scenarios.range_drive import Clock, write_drive
-from tests.scenarios.test_ranges_log import FIRST, START
+from tests.logs.range_drive import Clock, write_drive
+from tests.logs.test_ranges_log import FIRST, START
 
 TURNS = 4
 OUTAGE = (70, 90)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spoofgym.scenarios.fix_rows import known_sigmas, usable_rows, wild_fixes, wild_velocities
-from spoofgym.scenarios.log_warning import LogWarning
+from spoofgym.logs.fix_rows import known_sigmas, usable_rows, wild_fixes, wild_velocities
+from spoofgym.logs.log_warning import LogWarning
 
 ROWS = 40
 

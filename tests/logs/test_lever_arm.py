@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.scenarios.log import read_log
-from spoofgym.scenarios.log_warning import LogWarning
+from spoofgym.logs.log import read_log
+from spoofgym.logs.log_warning import LogWarning
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.trajectory import Accelerate, Straight, Turn, fly
-from tests.scenarios.range_drive import write_drive
+from tests.logs.range_drive import write_drive
 
 ARM = np.array([1.0, 3.0, 2.0])
 """Right, forward, up, m."""

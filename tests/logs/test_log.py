@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spoofgym.scenarios.log import interpolate, read_log, velocity_of
+from spoofgym.logs.log import interpolate, read_log, velocity_of
 
 NOTES = """name = "small"
 imu_to_body_frd = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]

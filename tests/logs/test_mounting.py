@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from spoofgym.scenarios.log import read_log
-from spoofgym.scenarios.mounting import find_delay, find_mounting
+from spoofgym.logs.log import read_log
+from spoofgym.logs.mounting import find_delay, find_mounting
 
 RATE = 50
 LENGTH = 300.0

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spoofgym.scenarios.notes import Notes
+from spoofgym.logs.notes import Notes
 
 GOOD = "imu_to_body_frd = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nstart_s = 2.0\n"
 DATA = Path(__file__).parents[3] / "shared" / "data"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from spoofgym.scenarios.recorded import recorded
-from tests.scenarios.range_drive import write_drive
+from tests.logs.range_drive import write_drive
 
 KINDS = [{"coupling": "tight"}, {"fixes": "ranges"}]
 

@@ -13,9 +13,9 @@ from scipy.constants import speed_of_light
 from scipy.spatial.transform import Rotation
 
 from spoofgym.geodesy import displace, ecef_to_enu_rotation, geodetic_to_ecef, position_difference
-from spoofgym.scenarios.log import interpolate, read_log
-from spoofgym.scenarios.range_fixes import range_fixes, solve_ranges
-from spoofgym.scenarios.ranges_log import CODE_SIGMA, Ranges, correct, read_ranges, zenith_troposphere
+from spoofgym.logs.log import interpolate, read_log
+from spoofgym.logs.range_fixes import range_fixes, solve_ranges
+from spoofgym.logs.ranges_log import CODE_SIGMA, Ranges, correct, read_ranges, zenith_troposphere
 from spoofgym.sensors.ephemeris import COLUMNS, read_csv
 from spoofgym.sensors.ranging import troposphere_mapping
 

@@ -15,10 +15,10 @@ from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.geodesy import displace
-from spoofgym.scenarios.log import Fixes, covered
-from spoofgym.scenarios.log_warning import LogWarning
+from spoofgym.logs.log import Fixes, covered
+from spoofgym.logs.log_warning import LogWarning
+from spoofgym.logs.reference import frozen_rows
 from spoofgym.scenarios.recorded import recorded
-from spoofgym.scenarios.reference import frozen_rows
 from tests.scenarios.test_recorded import write_log
 
 Row = list[float]

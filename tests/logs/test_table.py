@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spoofgym.scenarios import table
-from spoofgym.scenarios.table import check_increasing, read_table, seconds
+from spoofgym.logs import table
+from spoofgym.logs.table import check_increasing, read_table, seconds
 
 GROUP = [("t_s", "x")]
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks import make_attack
-from spoofgym.navigation.adaptation import Adaptation, NegativeRatioError
-from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.navigation.loose.adaptation import Adaptation, NegativeRatioError
+from spoofgym.navigation.loose.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import ImuGrade

@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import chi2
 
 from spoofgym.geodesy import position_difference
-from spoofgym.navigation.warm_start import ERROR
+from spoofgym.navigation.loose.warm_start import ERROR
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade

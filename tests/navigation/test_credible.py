@@ -8,8 +8,8 @@ from scipy.stats import chi2
 
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
-from spoofgym.navigation.credible import AuxiliaryRule
-from spoofgym.navigation.credible_filter import settled_covariance
+from spoofgym.navigation.credible.kalman import settled_covariance
+from spoofgym.navigation.credible.runs import AuxiliaryRule
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.navigation.kalman import correct_error
 from spoofgym.scenarios import make_scenario

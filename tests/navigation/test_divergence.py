@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.attacks import make_attack
 from spoofgym.detectors.base import Detector
-from spoofgym.navigation.closed_loop import rotate
 from spoofgym.navigation.divergence import FilterDivergedError
+from spoofgym.navigation.loose.kernels import rotate
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 

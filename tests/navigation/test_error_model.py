@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 from spoofgym.geodesy import displace, position_difference
+from spoofgym.mechanization import attitude_matrix, mechanize
 from spoofgym.navigation.error_model import navigation_dynamics, transition_matrix
-from spoofgym.navigation.mechanization import attitude_matrix, mechanize
 
 DT = 1e-3
 ATTITUDE = attitude_matrix(0.08, -0.3, 1.1)

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from spoofgym.navigation.error_model import navigation_dynamics
 from spoofgym.navigation.linear_model import semidefinite_factor
+from spoofgym.navigation.loose.warm_start import COLOUR, CONSTANT_BIAS, ERROR, INSTABILITY, cold_start, warm_up
 from spoofgym.navigation.tuning import ARCSECOND, FilterTuning
-from spoofgym.navigation.warm_start import COLOUR, CONSTANT_BIAS, ERROR, INSTABILITY, cold_start, warm_up
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G, grade
 from spoofgym.sensors.receiver import Receiver

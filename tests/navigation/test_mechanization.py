@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from spoofgym.geodesy import normal_gravity, position_difference
 from spoofgym.kernels import njit
-from spoofgym.navigation.mechanization import (
+from spoofgym.mechanization import (
     attitude_matrix,
     euler_angles,
     gravity_and_coriolis,

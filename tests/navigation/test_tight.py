@@ -6,8 +6,8 @@ from scipy import stats
 
 from spoofgym.attacks.base import Attack
 from spoofgym.navigation.interface import Decision, Demands
-from spoofgym.navigation.tight import TightNavigator
-from spoofgym.navigation.tight_own import TightOwnNavigator
+from spoofgym.navigation.tight.own_gains import TightOwnNavigator
+from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.kujur_flight import kujur_flight
 from spoofgym.simulation import Simulation

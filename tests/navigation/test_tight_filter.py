@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation import kalman, tight_filter
-from spoofgym.navigation.tight_states import (
+from spoofgym.navigation import kalman
+from spoofgym.navigation.tight import kalman as tight_filter
+from spoofgym.navigation.tight.states import (
     CLOCK,
     DRIFT,
     NUM_COMMON,

@@ -20,7 +20,7 @@ from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
-from tests.scenarios.range_drive import write_drive
+from tests.logs.range_drive import write_drive
 from tests.scenarios.test_recorded import write_log
 
 ONSET, BEGIN, END = 40.0, 55.0, 85.0

@@ -14,9 +14,9 @@ import spoofgym  # noqa: F401
 from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
 from spoofgym.geodesy import displace, position_difference
+from spoofgym.logs.log import interpolate, read_log
+from spoofgym.logs.log_warning import LogWarning
 from spoofgym.scenarios import make_scenario
-from spoofgym.scenarios.log import interpolate, read_log
-from spoofgym.scenarios.log_warning import LogWarning
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.simulation import Simulation
 from spoofgym.trajectory import Straight, Turn, fly

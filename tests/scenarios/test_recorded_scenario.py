@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spoofgym.logs.log_warning import LogWarning
 from spoofgym.scenarios import make_scenario
-from spoofgym.scenarios.log_warning import LogWarning
 from spoofgym.scenarios.recorded import recorded
-from tests.scenarios.range_drive import write_drive
+from tests.logs.range_drive import write_drive
 from tests.scenarios.test_recorded import write_log
 
 DATA = Path(__file__).parents[3] / "shared" / "data"

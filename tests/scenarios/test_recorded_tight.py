@@ -13,16 +13,16 @@ import spoofgym  # noqa: F401
 from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
 from spoofgym.geodesy import position_difference
-from spoofgym.navigation.tight_states import CLOCK
+from spoofgym.logs.log import interpolate, read_log
+from spoofgym.logs.ranges_log import read_ranges
+from spoofgym.navigation.tight.states import CLOCK
 from spoofgym.scenarios import make_scenario
-from spoofgym.scenarios.log import interpolate, read_log
-from spoofgym.scenarios.ranges_log import read_ranges
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
-from tests.scenarios.range_drive import DELAY, write_drive
-from tests.scenarios.test_ranges_log import CLOCK as CLOCK_OFFSET
-from tests.scenarios.test_ranges_log import DRIFT, FIRST
+from tests.logs.range_drive import DELAY, write_drive
+from tests.logs.test_ranges_log import CLOCK as CLOCK_OFFSET
+from tests.logs.test_ranges_log import DRIFT, FIRST
 from tests.scenarios.test_recorded import write_log
 
 PHONE = Path(__file__).parents[3] / "shared" / "data" / "car-phone-raw"

@@ -8,8 +8,8 @@ import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
-from spoofgym.navigation.adaptation import Adaptation
-from spoofgym.navigation.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
+from spoofgym.navigation.loose.adaptation import Adaptation
+from spoofgym.navigation.loose.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 

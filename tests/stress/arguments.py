@@ -25,11 +25,11 @@ from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
-from spoofgym.navigation.adaptation import Adaptation
-from spoofgym.navigation.credible import AuxiliaryRule
-from spoofgym.navigation.credible_filter import CredibleTuning
+from spoofgym.navigation.credible.kalman import CredibleTuning
+from spoofgym.navigation.credible.runs import AuxiliaryRule
 from spoofgym.navigation.facts import RANGES
 from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.loose.adaptation import Adaptation
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.parallel import RunSlices
 from spoofgym.responses import RESPONSES, make_response

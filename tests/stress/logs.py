@@ -17,7 +17,7 @@ from spoofgym.attacks import make_attack
 from spoofgym.detectors import make_detector
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
-from tests.scenarios.range_drive import write_drive
+from tests.logs.range_drive import write_drive
 
 FIELDS = (
     "", "nan", "NaN", "inf", "-inf", "1e300", "-1e300", "1e-300", "0", "-1", "4294967.295", "9999", "x", "é", "1,2",

@@ -1,7 +1,7 @@
 """Missed detection, shortest windows and protection levels of Kujur 2024, by the paper's formula and exactly.
 
 The paper's formula takes an innovation for the tracking error itself (eqs 38 and 46 to 48). In truth the filter
-follows what it is fed, and the next innovation sees the difference (`spoofgym.navigation.tracking_response`).
+follows what it is fed, and the next innovation sees the difference (`spoofgym.navigation.tight.tracking_response`).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from spoofgym.detectors import cpi_theory
 from spoofgym.detectors.cpi import UP, unit_vector
 from spoofgym.detectors.separation_theory import protection_level, separation_threshold
 from spoofgym.evaluation.reproduce.kujur_games import INTERVAL, Replica, flight
-from spoofgym.navigation.coasting import coasting_tables
-from spoofgym.navigation.tracking_response import projected_response, tracking_response
+from spoofgym.navigation.separation.coasting import coasting_tables
+from spoofgym.navigation.tight.tracking_response import projected_response, tracking_response
 from spoofgym.tight_scenario import TightScenario
 
 P_FA, P_MD_CPI, P_MD_SS = 1e-5, 1e-7, 1e-6

@@ -29,7 +29,7 @@ from spoofgym.evaluation.reproduce.rows import (
 )
 from spoofgym.evaluation.reproduce.tracks import Tracks, play
 from spoofgym.navigation.interface import Decision, Demands
-from spoofgym.navigation.loose import StrapdownNavigator
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.optimum.play import expected_play
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario

@@ -25,7 +25,7 @@ from spoofgym.evaluation.reproduce.rows import (
     rounded,
     wilson_interval,
 )
-from spoofgym.navigation.adaptation import NegativeRatioError
+from spoofgym.navigation.loose.adaptation import NegativeRatioError
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 

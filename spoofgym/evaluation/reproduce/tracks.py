@@ -9,8 +9,8 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.navigation.interface import Decision
-from spoofgym.navigation.loose import StrapdownNavigator
-from spoofgym.navigation.own_covariance import OwnCovarianceNavigator
+from spoofgym.navigation.loose.own_gains import OwnCovarianceNavigator
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.simulation import Simulation
 
 

@@ -19,7 +19,7 @@ from spoofgym.arrays import Floats
 from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.warm_start import COLOUR, NUM_JOINT
+from spoofgym.navigation.loose.warm_start import COLOUR, NUM_JOINT
 from spoofgym.sensors.receiver import Receiver
 
 SETTLING = 500
@@ -199,8 +199,8 @@ def credible_linear_model(tuning: CredibleTuning, anchored: bool, time: Floats) 
 def standing_start(tuning: CredibleTuning, receiver: Receiver) -> Floats:
     """A square root of the joint covariance of a filter that has stood still for long, and its receiver, (30, 30).
 
-    In the layout of `spoofgym.navigation.warm_start`. The wheels do not turn, so that only the receiver errs (Song
-    2021, step 1, and data set Ψ1). Solves Y = A Y A' + N for y = [p, v, colour].
+    In the layout of `spoofgym.navigation.loose.warm_start`. The wheels do not turn, so that only the receiver errs
+    (Song 2021, step 1, and data set Ψ1). Solves Y = A Y A' + N for y = [p, v, colour].
     """
     transition, gain = epoch_transition(tuning, anchored=True)
     kept = transition - np.outer(gain, transition[0])

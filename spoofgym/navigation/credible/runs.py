@@ -10,7 +10,7 @@ from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
-from spoofgym.navigation.credible_filter import (
+from spoofgym.navigation.credible.kalman import (
     HEIGHT,
     POSITIONS,
     VELOCITIES,
@@ -20,7 +20,7 @@ from spoofgym.navigation.credible_filter import (
     update_covariance,
 )
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.linear import NO_DEMANDS
+from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.odometer import Odometer, OdometerGrade, PlanarMotion, draw_displacement
 from spoofgym.streams import RunStreams

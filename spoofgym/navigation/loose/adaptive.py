@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.adaptation import Adaptation, adapt, negative_ratio
 from spoofgym.navigation.interface import Demands, Innovation
-from spoofgym.navigation.linear import NO_DEMANDS
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose import StrapdownNavigator
-from spoofgym.navigation.own_covariance import GRAIN, OwnCovarianceNavigator
-from spoofgym.navigation.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.adaptation import Adaptation, adapt, negative_ratio
+from spoofgym.navigation.loose.own_gains import GRAIN, OwnCovarianceNavigator
+from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.streams import RunStreams

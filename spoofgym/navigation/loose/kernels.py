@@ -7,9 +7,9 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import enu_difference, enu_displacement
 from spoofgym.kernels import njit
+from spoofgym.mechanization import load_matrix, mechanize, product, rotation, transpose
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
-from spoofgym.navigation.mechanization import load_matrix, mechanize, product, rotation, transpose
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
 
 # rows of the state kept when a fix is taken

@@ -9,14 +9,14 @@ from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.linear import (
+from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose.shared_gains import (
     NO_DEMANDS,
     POSITION,
     LinearNavigator,
     draw_process_noise,
     observe,
 )
-from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.streams import RunStreams

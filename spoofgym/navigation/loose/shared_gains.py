@@ -13,7 +13,7 @@ from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
+from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.streams import RunStreams

@@ -15,13 +15,13 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
-from spoofgym.navigation import closed_loop
 from spoofgym.navigation.divergence import NUM_HELD, blank, hold
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.linear import NO_DEMANDS
-from spoofgym.navigation.strapdown_model import StrapdownModel
-from spoofgym.navigation.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
+from spoofgym.navigation.loose import kernels as closed_loop
+from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 

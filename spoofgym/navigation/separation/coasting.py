@@ -28,8 +28,8 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_STATES
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tight_states import INERTIAL, POSITION
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.states import INERTIAL, POSITION
 
 ORIGIN_LIFE = 600.0
 """Time after which the origin is moved on, s: about the time constant of a free vertical channel, in which C grows.

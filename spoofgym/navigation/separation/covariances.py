@@ -9,8 +9,8 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
-from spoofgym.navigation.coasting import PACKED
 from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.navigation.separation.coasting import PACKED
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

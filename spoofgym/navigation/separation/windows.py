@@ -10,10 +10,9 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
-from spoofgym.navigation.coasting import PACKED, CoastingTables
 from spoofgym.navigation.error_model import NUM_STATES
-from spoofgym.navigation.tight_filter import POSITION
-from spoofgym.navigation.window_covariances import (
+from spoofgym.navigation.separation.coasting import PACKED, CoastingTables
+from spoofgym.navigation.separation.covariances import (
     bring_back,
     fill_early,
     move_covariances,
@@ -21,6 +20,7 @@ from spoofgym.navigation.window_covariances import (
     take_back,
     with_gained,
 )
+from spoofgym.navigation.tight.kalman import POSITION
 
 
 class CoastingWindows:

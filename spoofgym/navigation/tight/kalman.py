@@ -10,7 +10,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
-from spoofgym.navigation.tight_states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE
+from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE
 
 POSITION = 6
 """Place of the position's first state."""

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
-from spoofgym.navigation import kalman, tight_filter
+from spoofgym.navigation import kalman
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import ErrorDynamics, semidefinite_factor
-from spoofgym.navigation.tight_states import (
+from spoofgym.navigation.tight import kalman as tight_filter
+from spoofgym.navigation.tight.states import (
     BIAS,
     CLOCK,
     DRIFT,

@@ -6,14 +6,14 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
-from spoofgym.navigation import tight_filter
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.linear import NO_DEMANDS
+from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
 from spoofgym.navigation.position_domain import project_onto_position
-from spoofgym.navigation.tight import TightNavigator, at_epochs, predict_auxiliary, predict_run
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tight_states import INERTIAL, POSITION
+from spoofgym.navigation.tight import kalman as tight_filter
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.shared_gains import TightNavigator, at_epochs, predict_auxiliary, predict_run
+from spoofgym.navigation.tight.states import INERTIAL, POSITION
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 

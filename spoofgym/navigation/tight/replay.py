@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.interface import Demands
-from spoofgym.navigation.linear import NO_DEMANDS
-from spoofgym.navigation.strapdown_model import StrapdownModel
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tight_states import CLOCK
-from spoofgym.navigation.tight_strapdown import TightStrapdownNavigator
+from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.states import CLOCK
+from spoofgym.navigation.tight.strapdown import TightStrapdownNavigator
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 

@@ -11,17 +11,19 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, ecef, geodetic_to_ecef
 from spoofgym.kernels import njit
-from spoofgym.navigation import closed_loop, kalman, tight_filter
+from spoofgym.navigation import kalman
 from spoofgym.navigation.divergence import blank
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.linear import NO_DEMANDS
-from spoofgym.navigation.loose import StrapdownNavigator
+from spoofgym.navigation.loose import kernels as closed_loop
+from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
+from spoofgym.navigation.loose.strapdown import StrapdownNavigator
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.position_domain import project_onto_position
-from spoofgym.navigation.strapdown_model import StrapdownModel
-from spoofgym.navigation.tight import at_epochs, draw_process_noise, start_satellites
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tight_states import BIAS, CLOCK, INERTIAL, POSITION
+from spoofgym.navigation.tight import kalman as tight_filter
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.shared_gains import at_epochs, draw_process_noise, start_satellites
+from spoofgym.navigation.tight.states import BIAS, CLOCK, INERTIAL, POSITION
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.navigation.error_model import NUM_NAVIGATION
-from spoofgym.navigation.tight_model import TightModel
-from spoofgym.navigation.tight_states import CLOCK, DRIFT, INERTIAL, POSITION, VELOCITY, slot_states
+from spoofgym.navigation.tight.model import TightModel
+from spoofgym.navigation.tight.states import CLOCK, DRIFT, INERTIAL, POSITION, VELOCITY, slot_states
 
 
 def tracking_response(model: TightModel, direction: Floats) -> Floats:

@@ -1,0 +1,1 @@
+"""The tightly coupled filter: ranges to satellites correct an inertial solution."""
