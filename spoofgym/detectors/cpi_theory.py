@@ -19,8 +19,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy import special
 
-from spoofgym import quadratic_form, validation
+from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.detectors import quadratic_form
 from spoofgym.detectors.chi_square import quantile
 
 OWNER = "cpi_theory"

@@ -77,7 +77,7 @@ class Consistent(Reuse):
     Args:
         epochs: how many fixes in a row, 1 or more.
         threshold: of the NIS; None = the chi-square quantile at 1e-3. Where the filter over-states R, the NIS is larger
-            in coasting than it is in use: `spoofgym.reuse_calibration` sets the threshold for coasting.
+            in coasting than it is in use: `spoofgym.calibration.reuse` sets the threshold for coasting.
     """
 
     def __init__(self, epochs: int, threshold: float | None = None) -> None:

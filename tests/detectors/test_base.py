@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks import make_attack
-from spoofgym.clean_statistics import joint_statistics, white_statistics
+from spoofgym.calibration.clean_statistics import joint_statistics, white_statistics
 from spoofgym.detectors import Ensemble, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.ring import Ring

@@ -5,7 +5,7 @@ import pytest
 
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated, measure_arl0
-from spoofgym.clean_statistics import simulated_statistics
+from spoofgym.calibration.clean_statistics import simulated_statistics
 from spoofgym.detectors import BiasRange, make_detector
 from spoofgym.detectors import at_arl0 as with_arl0
 from spoofgym.navigation.facts import FilterFacts

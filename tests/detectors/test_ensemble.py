@@ -4,10 +4,11 @@ import json
 import numpy as np
 import pytest
 
-from spoofgym import calibration, calibration_cache
 from spoofgym.attacks import make_attack
+from spoofgym.calibration import cache as calibration_cache
 from spoofgym.calibration import calibrate, calibrated
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration import thresholds as calibration
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import Ensemble, SignedMean, Snapshot, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.navigation.interface import Demands, Epoch, Innovation

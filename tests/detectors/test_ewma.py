@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 from spoofgym.calibration import calibrate
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import Ewma, Mewma, make_detector
 
 FALSE_FAILURE = 1e-7

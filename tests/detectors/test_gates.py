@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 from spoofgym.calibration import calibrate
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import ArduPilotGate, Px4Gate, at_arl0, make_detector
 from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.responses.ardupilot import ArduPilotGlitch

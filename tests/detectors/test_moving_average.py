@@ -3,7 +3,7 @@ import pytest
 from scipy import integrate, special, stats
 
 from spoofgym.calibration import calibrate
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import FiniteMovingAverage, make_detector
 from spoofgym.detectors.moving_average import log_mean_ratio
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from spoofgym.calibration import calibrated_all
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import DETECTORS, Ensemble, Snapshot, Windowed, make_detector
 from spoofgym.detectors.base import seen
 from spoofgym.detectors.chi_square import quantile_ratios

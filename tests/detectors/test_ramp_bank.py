@@ -6,7 +6,7 @@ from scipy import stats
 
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrate
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import RampBank, make_detector
 from spoofgym.detectors.ramp_bank import ramp_signatures
 from spoofgym.navigation.interface import Epoch, Innovation

@@ -3,10 +3,10 @@ import copy
 import numpy as np
 import pytest
 
-from spoofgym import calibration
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
-from spoofgym.clean_statistics import simulated_statistics
+from spoofgym.calibration import thresholds as calibration
+from spoofgym.calibration.clean_statistics import simulated_statistics
 from spoofgym.detectors import RelativeMotion, make_detector
 from spoofgym.navigation.interface import Decision, Demands, Epoch, Innovation
 from spoofgym.scenarios import make_scenario

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from spoofgym.calibration import calibrate
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import Rio, make_detector
 from spoofgym.navigation.interface import Epoch, Innovation
 

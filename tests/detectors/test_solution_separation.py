@@ -6,7 +6,7 @@ from scipy import stats
 
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrate
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import SolutionSeparation, make_detector
 from spoofgym.detectors.solution_separation import separation_map
 from spoofgym.navigation.interface import Decision, Demands, Epoch, Innovation

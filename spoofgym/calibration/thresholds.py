@@ -10,27 +10,24 @@ from __future__ import annotations
 
 import copy
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
-from spoofgym import calibration_cache, validation
+from spoofgym import validation
 from spoofgym.arrays import Floats
-from spoofgym.calibration_cache import Setting
-from spoofgym.clean_statistics import (
+from spoofgym.calibration import cache as calibration_cache
+from spoofgym.calibration.cache import Setting
+from spoofgym.calibration.clean_statistics import (
     CleanStatistics,
     JointStatistics,
     joint_statistics,
     white_statistics,
 )
-from spoofgym.command_line import Parser, above_one, count, seed_number
+from spoofgym.calibration.first_alarms import FirstAlarms
 from spoofgym.detectors.base import Detector
-from spoofgym.detectors.chi_square import DEFAULT_ARL0, DEFAULT_WINDOW, Windowed
-from spoofgym.first_alarms import FirstAlarms
-from spoofgym.program import program
 from spoofgym.scenario import Scenario
 from spoofgym.validation import written
 
@@ -369,30 +366,3 @@ def growth(detector: Detector, time: Floats, statistics: Floats) -> float:
     since = time[full] - time[full].mean()
     mean = statistics[:, full].mean(axis=0)
     return float(np.sum(since * mean) / np.sum(since**2))
-
-
-@program
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the threshold of a windowed test on white innovations."""
-    parser = Parser(prog="python -m spoofgym.calibration", description=main.__doc__)
-    parser.add_argument("--dimension", type=int, default=3, choices=(3, 6), help="of the fix (default: %(default)s)")
-    parser.add_argument("--window", type=count, default=DEFAULT_WINDOW, help="n, epochs (default: %(default)s)")
-    parser.add_argument("--arl0", type=above_one, default=DEFAULT_ARL0, help="epochs (default: %(default)s)")
-    parser.add_argument("--epochs", type=count, default=1000, help="of a run (default: %(default)s)")
-    parser.add_argument("--alarms", type=count, default=5000, help="first alarms that decide (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of the noise (default: %(default)s)")
-    options = parser.parse_args(arguments)
-    clean = white_statistics(np.eye(options.dimension), options.epochs)
-    detector = Windowed(options.window)
-    result = calibrate(detector, clean, options.arl0, first_alarms=options.alarms, seed=options.seed)
-    low, high = result.interval
-    print(
-        f"windowed n={options.window} m={options.dimension}: threshold {result.threshold:.3f} "
-        f"at ARL0 {result.arl0:.4g} epochs, 95 % [{low:.4g}, {high:.4g}], "
-        f"{result.first_alarms} first alarms in {result.epochs_at_risk:.3g} epochs"
-    )
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

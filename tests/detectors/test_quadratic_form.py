@@ -6,7 +6,7 @@ import pytest
 from scipy import integrate, special, stats
 from scipy.linalg import toeplitz
 
-from spoofgym.quadratic_form import cdf, imhof, log_cdf, log_sf, sf
+from spoofgym.detectors.quadratic_form import cdf, imhof, log_cdf, log_sf, sf
 
 TAILS = [1e-200, 1e-100, 1e-40, 1e-12, 1e-7, 1e-3, 0.1, 0.3, 0.45, 0.5, 0.55]
 SPREADS = [

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from spoofgym import calibration
 from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_interval
-from spoofgym.clean_statistics import white_statistics
+from spoofgym.calibration import thresholds as calibration
+from spoofgym.calibration.clean_statistics import white_statistics
+from spoofgym.calibration.first_alarms import FirstAlarms
 from spoofgym.detectors import Acna, Snapshot, Windowed, make_detector
-from spoofgym.first_alarms import FirstAlarms
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.white import WhiteInnovations
 

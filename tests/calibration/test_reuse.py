@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from spoofgym.calibration.reuse import LONGEST, SHORTEST, calibrated_reuse, coasting_nis
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses import make_response
-from spoofgym.reuse_calibration import LONGEST, SHORTEST, calibrated_reuse, coasting_nis
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation

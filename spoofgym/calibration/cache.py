@@ -29,11 +29,10 @@ from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
 SOURCES = (
-    *("sensors/*.py", "navigation/**/*.py", "detectors/*.py", "scenarios/*.py", "logs/*.py"),
-    *("attacks/*.py", "mechanization.py"),
-    *("simulation.py", "scenario.py", "tight_scenario.py", "trajectory.py", "geodesy.py", "streams.py", "arrays.py"),
-    *("timeline.py", "specification.py", "validation.py", "calibration.py", "clean_statistics.py", "first_alarms.py"),
-    *("quadratic_form.py", "clean_starts.py", "burn_in_cache.py", "parallel.py"),
+    *("sensors/*.py", "navigation/**/*.py", "detectors/*.py", "scenarios/*.py", "logs/*.py", "attacks/*.py"),
+    *("calibration/*.py", "simulation.py", "scenario.py", "tight_scenario.py", "trajectory.py", "geodesy.py"),
+    *("mechanization.py", "timeline.py", "streams.py", "arrays.py", "specification.py", "validation.py"),
+    *("clean_starts.py", "burn_in_cache.py", "parallel.py"),
 )
 LARGEST_FILE = 2**16
 """Characters; a result takes some hundreds."""

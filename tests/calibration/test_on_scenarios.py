@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from spoofgym import calibration
 from spoofgym.calibration import calibrate, calibrated, measure_arl0
-from spoofgym.clean_statistics import simulated_statistics, white_statistics
+from spoofgym.calibration import thresholds as calibration
+from spoofgym.calibration.clean_statistics import simulated_statistics, white_statistics
 from spoofgym.detectors import Ensemble, make_detector
 from spoofgym.detectors.chi_square import WINDOWED_THRESHOLDS
 from spoofgym.navigation.tuning import FilterTuning

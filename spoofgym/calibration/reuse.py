@@ -11,7 +11,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
-from spoofgym.calibration_cache import identity
+from spoofgym.calibration.cache import identity
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
 from spoofgym.responses.excluding import ExcludingResponse
