@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
+from spoofgym.calibration import __main__ as program
 from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_interval
 from spoofgym.calibration import thresholds as calibration
 from spoofgym.calibration.clean_statistics import white_statistics
@@ -186,7 +187,7 @@ def test_the_program_prints_a_row(monkeypatch, capsys):
     monkeypatch.setattr(
         sys, "argv", ["calibration", "--window", "3", "--arl0", "100", "--alarms", "200", "--epochs", "50"]
     )
-    calibration.main()
+    program.main()
     words = capsys.readouterr().out.split()
     threshold = float(words[words.index("threshold") + 1])
     assert stats.chi2.isf(3 / 100, 9) < threshold < stats.chi2.isf(1 / 100, 9)
