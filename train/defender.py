@@ -30,8 +30,8 @@ from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.evaluation.defence import World, play_policy
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import INTERRUPTED, program
-from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario
 from train import checkpoint
 from train.defender_ppo import Settings, begin, export, make_learner

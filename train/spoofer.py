@@ -26,8 +26,8 @@ from spoofgym import files
 from spoofgym.command_line import Parser, count
 from spoofgym.console import console
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig, configure
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import INTERRUPTED, program
-from spoofgym.scenario import FIDELITIES
 from train import checkpoint
 from train.ppo import Settings, export, make_learner
 from train.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options, given_options

@@ -30,7 +30,7 @@ from spoofgym.scenarios import make_scenario
 
 SOURCES = (
     *("sensors/*.py", "navigation/**/*.py", "detectors/*.py", "scenarios/*.py", "logs/*.py", "attacks/*.py"),
-    *("calibration/*.py", "simulation.py", "scenario.py", "tight_scenario.py", "trajectory.py", "geodesy.py"),
+    *("calibration/*.py", "simulation.py", "scenario.py", "fitting.py", "truth.py", "trajectory.py", "geodesy.py"),
     *("mechanization.py", "timeline.py", "streams.py", "arrays.py", "specification.py", "validation.py"),
     *("clean_starts.py", "burn_in_cache.py", "parallel.py"),
 )

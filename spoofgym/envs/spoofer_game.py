@@ -23,6 +23,7 @@ from spoofgym.envs.frames import FrameStack, stacked_fields
 from spoofgym.envs.observation import AXES, Squash, observation_space, spoofer_fields
 from spoofgym.envs.shadow import ShadowFilter, require_fitting, shadow_model
 from spoofgym.envs.tight_shadow import TightShadowFilter
+from spoofgym.navigation.facts import RANGES
 from spoofgym.navigation.interface import RangeNavigator
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
@@ -92,7 +93,7 @@ class SpooferGame:
         self.config = config
         with validation.argument(OWNER, "scenario"):
             scenario = make_scenario(config.scenario, config.coupling)
-        self._ranges = scenario.coupling == "tight"
+        self._ranges = RANGES in scenario.offers
         if self._ranges and config.action == "innovation":
             raise ValueError(
                 f"action 'innovation' is for filters on fixes: scenario {scenario.name!r} is tightly coupled, and no "
