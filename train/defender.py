@@ -22,7 +22,6 @@ import torch
 from rich.console import Console
 from stable_baselines3 import PPO
 
-from agents.learned import POLICY_FILE, LearnedDefender
 from spoofgym import files
 from spoofgym.calibration import calibrated_all
 from spoofgym.command_line import Parser
@@ -31,6 +30,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.navigation.family import FIDELITIES
+from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
 from spoofgym.program import INTERRUPTED, program
 from spoofgym.scenarios import make_scenario
 from train import checkpoint

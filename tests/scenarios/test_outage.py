@@ -241,7 +241,8 @@ def test_ranges_every_two_seconds_are_gone_through_in_parts(tmp_path: Path) -> N
     path.write_text("\n".join([header, *(line for line in lines if line.split(",")[1] in kept)]) + "\n")
     scenario = recorded(str(tmp_path / "log"), coupling="tight", horizon=20)
     assert isinstance(scenario.family, RecordedRanges)
-    bounds, places = scenario.family.model.parts
+    steps = scenario.family.model.steps
+    bounds, places = steps.bounds, steps.places
     np.testing.assert_array_equal(np.diff(places), 2)
     lengths = np.add.reduceat(scenario.family.model.step, bounds[:-1])
     assert 0.97 < lengths.min() <= lengths.max() < 1.03
