@@ -24,7 +24,7 @@ from torch import nn
 
 from agents.learned import LearnedDefender
 from spoofgym.envs.config import DefenderConfig
-from spoofgym.envs.defender_game import EXCLUDE
+from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.envs.range_features import SLOT_FIELD
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
