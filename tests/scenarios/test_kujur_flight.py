@@ -46,7 +46,7 @@ def test_loose_coupling_takes_fixes_from_the_same_sky():
     loose, tight = make_scenario(LOOSE), make_scenario("kujur-flight:horizon=20,onset=60")
     assert loose.name == LOOSE
     assert (loose.family.coupling, loose.dimension, loose.matched) == ("loose", 3, False)
-    sky, epoch = tight.geometry, 119
+    sky, epoch = tight.family.geometry, 119
     elevation, present = sky.elevation[epoch], sky.present[epoch]
     shell = 1.0 / np.sqrt(1.0 - (6378136.3 / 6728136.3 * np.cos(elevation)) ** 2)
     mapping = 1.001 / np.sqrt(0.002001 + np.sin(elevation) ** 2)
@@ -54,7 +54,7 @@ def test_loose_coupling_takes_fixes_from_the_same_sky():
     weight = present / (own + (0.09 * mapping) ** 2)
     to_fix = projection(sky.line_of_sight[[epoch]], present[None], weight[None])[0, :3]
     variance = np.sum(to_fix**2 * own, axis=1) + (to_fix @ (0.09 * mapping)) ** 2
-    np.testing.assert_allclose(loose.tuning.measurement_sigma, np.sqrt(variance), rtol=1e-9)
+    np.testing.assert_allclose(loose.family.tuning.measurement_sigma, np.sqrt(variance), rtol=1e-9)
 
 
 @pytest.mark.parametrize("fidelity", ["linear", "strapdown"])
