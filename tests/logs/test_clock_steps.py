@@ -43,7 +43,7 @@ def steady(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[int, int], Re
 
 def largest_difference(one: RecordedRanges, other: RecordedRanges) -> float:
     """Of the filters' positions at the epochs of two drives, m."""
-    return float(np.abs(position_difference(one.clean.position, other.clean.position)).max())
+    return float(np.abs(position_difference(one.family.clean.position, other.family.clean.position)).max())
 
 
 MILLISECONDS = [
