@@ -241,7 +241,7 @@ def test_ranges_every_two_seconds_are_gone_through_in_parts(tmp_path: Path) -> N
     path.write_text("\n".join([header, *(line for line in lines if line.split(",")[1] in kept)]) + "\n")
     scenario = recorded(str(tmp_path / "log"), coupling="tight", horizon=20)
     assert isinstance(scenario, RecordedRanges)
-    bounds, places = scenario.model.parts
+    bounds, places = scenario.model.steps.bounds, scenario.model.steps.places
     np.testing.assert_array_equal(np.diff(places), 2)
     lengths = np.add.reduceat(scenario.model.step, bounds[:-1])
     assert 0.97 < lengths.min() <= lengths.max() < 1.03
