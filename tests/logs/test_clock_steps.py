@@ -96,7 +96,7 @@ def test_a_step_of_the_ranges_that_the_tags_do_not_show(size: float, tmp_path: P
 
 def test_a_steady_clock_has_no_steps(steady) -> None:
     """140 steps of standard normal noise at 8 sigma, 140 rates at 12: false failure below 1e-12."""
-    ranges = read_ranges(steady[0, 0].log.folder)
+    ranges = read_ranges(steady[0, 0].family.log.folder)
     steps = find_steps(solve_ranges(ranges, START))
     assert not any(values.any() for values in (steps.offset, steps.rate, steps.variance))
     again = without_steps(ranges, START)
