@@ -23,9 +23,8 @@ def calibrated_for_play(detectors: Sequence[Detector], scenario: Scenario, fidel
         The detectors in order, copies where a threshold was set.
 
     Raises:
-        ValueError: the scenario lacks the fidelity, or what `calibrated_all` refuses.
+        ValueError: what `calibrated_all` refuses.
     """
-    scenario.check_fidelity(fidelity)
     return calibrated_all(detectors, scenario, calibration_fidelity(scenario, fidelity))
 
 

@@ -44,7 +44,7 @@ def rows(
         num_threads: that simulate.
 
     Raises:
-        ValueError: a detector that is unknown or does not fit the scenario, or a scenario without one of the fidelities.
+        ValueError: a detector that is unknown or does not fit the scenario, or a scenario without both fidelities.
     """
     specifications = [(text, arl0) for text in detectors for arl0 in arl0s]
     ready = calibrated_all([make_detector(at_arl0(text, arl0)) for text, arl0 in specifications], scenario)
