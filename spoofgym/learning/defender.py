@@ -33,9 +33,9 @@ from spoofgym.learning import checkpoint
 from spoofgym.learning.defender_ppo import Settings, begin, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options, given_options
 from spoofgym.learning.watch import CHECKPOINTS, Watch, mean_return
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
 from spoofgym.program import INTERRUPTED, program
-from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario
 
 DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")

@@ -29,8 +29,8 @@ from spoofgym.learning import checkpoint
 from spoofgym.learning.ppo import Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options, given_options
 from spoofgym.learning.watch import Watch, mean_return
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import INTERRUPTED, program
-from spoofgym.scenario import FIDELITIES
 
 
 def parser() -> argparse.ArgumentParser:
