@@ -16,8 +16,8 @@ from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.evaluation import defenders
 from spoofgym.evaluation.matrix_games import Matrix
 from spoofgym.learning import defender
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.classical import ClassicalDefender
-from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario
 
 SCENARIO = "liu-flight:horizon=22,markov_sigma=2,markov_time=30"
