@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spoofgym import validation
 from spoofgym.arrays import Runs
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.opponents import make_defender
@@ -55,7 +55,7 @@ class SpooferGame(OneSeatGame):
             raise ValueError(f"{OWNER}: detector: each detector can be given once only, got {', '.join(names)}")
         frame_fields(config, scenario, names, num_lanes)  # refuses what does not fit before thresholds are looked for
         with validation.argument(OWNER, "detector"):
-            detectors = [calibrated(detector, scenario) for detector in detectors]
+            detectors = calibrated_for_play(detectors, scenario, config.fidelity)
         with validation.argument(OWNER, "response"):
             defender = make_defender(config.response, scenario, detectors)
         self._defenders = defender if config.on_alarm == "respond" and isinstance(defender, ResponsePool) else None
