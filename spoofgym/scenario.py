@@ -18,11 +18,13 @@ from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
 from spoofgym.navigation.loose.adaptation import Adaptation
 from spoofgym.navigation.loose.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
+from spoofgym.navigation.loose.mean import LooseMeanFilter
 from spoofgym.navigation.loose.own_gains import OwnCovarianceNavigator
 from spoofgym.navigation.loose.shared_gains import LinearNavigator
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.navigation.loose.strapdown_model import strapdown_model
 from spoofgym.navigation.loose.warm_start import COLOUR, RANGES, WarmStart, cold_start, num_joint, warm_up
+from spoofgym.navigation.mean import MeanFilter
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.navigation.white import WhiteInnovations
@@ -131,6 +133,18 @@ class Scenario(Immutable, ABC):
             ValueError: the filter is loosely coupled.
         """
         raise ValueError(f"scenario {self.name!r} is loosely coupled: it has a linear_model, not a tight_model")
+
+    def mean_filter(self, num_runs: int, slices: RunSlices) -> MeanFilter:
+        """The filter of ``num_runs`` games run in expectation, which is what a spoofer's shadow filter is.
+
+        Args:
+            num_runs: N.
+            slices: the threads to use.
+
+        Raises:
+            ValueError: the scenario has no linear model.
+        """
+        return LooseMeanFilter(self.linear_model(), num_runs, slices)
 
     def white_innovations(self) -> WhiteInnovations:
         """What clean innovations at epochs 0..K are made of, where the filter is matched."""

@@ -14,6 +14,8 @@ from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
 from spoofgym.navigation.loose.strapdown_model import strapdown_model
+from spoofgym.navigation.mean import MeanFilter
+from spoofgym.navigation.tight.mean import TightMeanFilter
 from spoofgym.navigation.tight.model import (
     TightDynamics,
     TightModel,
@@ -187,6 +189,10 @@ class TightScenario(Scenario):
         dynamics = self._dynamics
         prior = settle(dynamics.part(0, first), cold)
         return tight_model(dynamics.part(first, first + self.horizon + burn_in + 1), prior)
+
+    def mean_filter(self, num_runs: int, slices: RunSlices) -> MeanFilter:
+        """The filter of ``num_runs`` games run in expectation."""
+        return TightMeanFilter(self.tight_model(), num_runs, slices)
 
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """A tightly coupled filter has none.

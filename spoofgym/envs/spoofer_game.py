@@ -21,12 +21,11 @@ from spoofgym.envs.actions import rates
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
 from spoofgym.envs.observation import AXES, Squash, observation_space, spoofer_fields
-from spoofgym.envs.shadow import ShadowFilter, require_fitting, shadow_model
-from spoofgym.envs.tight_shadow import TightShadowFilter
+from spoofgym.envs.shadow import shadow_filter
 from spoofgym.navigation.interface import RangeNavigator
+from spoofgym.navigation.mean import MeanFilter
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
-from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
@@ -123,11 +122,11 @@ class SpooferGame:
         )
         self.scenario = scenario
         self.num_lanes = num_lanes
-        self.shadow: ShadowFilter | TightShadowFilter | None = None
+        self.shadow: MeanFilter | None = None
         if config.knowledge != "blind":
             with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):
                 believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
-                self.shadow = self._shadow_filter(believed)
+                self.shadow = shadow_filter(scenario, believed, num_lanes, self.simulation.slices)
         self.observation_space = observation_space(self.fields)
         rates = (*scenario.drag_off_rate, scenario.clock_rate) if self._ranges else scenario.drag_off_rate
         self.action_space = spaces.Box(-1.0, 1.0, (len(rates),), np.float32)
@@ -147,13 +146,6 @@ class SpooferGame:
         self._alarmed = np.zeros(num_lanes, dtype=bool)
         self._nobody = np.zeros(num_lanes, dtype=bool)
         self._thresholds = np.array([detector.threshold for detector in detectors])
-
-    def _shadow_filter(self, believed: Scenario) -> ShadowFilter | TightShadowFilter:
-        """The filter of the scenario for which the spoofer takes the victim's, run in expectation."""
-        if not self._ranges:
-            return ShadowFilter(shadow_model(self.scenario, believed), self.num_lanes, self.simulation.slices)
-        require_fitting(self.scenario, believed)
-        return TightShadowFilter(believed.tight_model(), self.num_lanes, self.simulation.slices)
 
     @property
     def index(self) -> Runs:
@@ -235,7 +227,7 @@ class SpooferGame:
         """The offset that the spoofer means to send, (N, 3) or (N, 4), m ENU and m."""
         if self.config.action == "rate":
             return previous + actions * self._reach[np.minimum(self.index, self._horizon - 1)]
-        assert isinstance(self.shadow, ShadowFilter)
+        assert self.shadow is not None  # the configuration refuses a blind spoofer with this action
         following = np.minimum(self.index + 1, self._horizon)
         return self.shadow.offset_for(following, INNOVATION_UNIT * actions)
 
@@ -271,11 +263,11 @@ class SpooferGame:
         if self.config.tracking_sigma:
             velocity += self._tracking[self._all, epoch.index, 3:] / self._interval
         parts = [self.offset, (epoch.index / self._horizon)[:, None], velocity, self._tracking_sigma]
-        if self.shadow is not None:
-            mean = self.shadow.mean
-            parts += [self.shadow.whitened, self.shadow.coming, mean[:, 6:9], mean[:, 3:6]]
-            if isinstance(self.shadow, TightShadowFilter):
-                parts.append(self.shadow.clock[:, None])
+        shadow = self.shadow
+        if shadow is not None:
+            parts += [shadow.whitened, shadow.coming, shadow.position_error, shadow.velocity_error]
+            if self._ranges:
+                parts.append(shadow.clock_error[:, None])
             if self.config.knowledge == "full":
                 parts.append(epoch.innovation.in_position.whitened)
                 for statistic, threshold in zip(epoch.statistics.values(), self._thresholds, strict=True):

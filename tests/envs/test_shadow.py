@@ -40,7 +40,7 @@ def test_means_are_those_of_the_model_that_the_spoofer_believes_in(shadow: str |
         offsets.append(env.game.offset[0].copy())
     play = expected_play(make_scenario(shadow or SHORT).linear_model(), np.array(offsets), 25.9)
     np.testing.assert_allclose(whitened, play.whitened, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(env.game.shadow.mean[0, 6:8], play.final_error, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(env.game.shadow.position_error[0, :2], play.final_error, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("shadow", WRONG)
