@@ -213,15 +213,7 @@ def gravity_and_coriolis(latitude: float, height: float, east: float, north: flo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def mean_gravity_and_coriolis(
-    latitude: float,
-    height: float,
-    east: float,
-    north: float,
-    up: float,
-    force_east: float,
-    force_north: float,
-    force_up: float,
-    dt: float,
+    latitude: float, height: float, east: float, north: float, up: float, force: Vector, dt: float
 ) -> Vector:
     """`gravity_and_coriolis` in the middle of a step, where the velocity is v_half (head of this file).
 
@@ -231,9 +223,7 @@ def mean_gravity_and_coriolis(
         east: Velocity at the start, m/s.
         north: Velocity at the start, m/s.
         up: Velocity at the start, m/s.
-        force_east: Specific force in ENU, mean over the step, m/s^2.
-        force_north: The same, m/s^2.
-        force_up: The same, m/s^2.
+        force: Specific force east, north, up, mean over the step, m/s^2.
         dt: s.
 
     Returns:
@@ -244,9 +234,9 @@ def mean_gravity_and_coriolis(
     return gravity_and_coriolis(
         latitude,
         height + half * up,
-        east + half * (force_east + other[0]),
-        north + half * (force_north + other[1]),
-        up + half * (force_up + other[2]),
+        east + half * (force[0] + other[0]),
+        north + half * (force[1] + other[1]),
+        up + half * (force[2] + other[2]),
     )
 
 
@@ -307,7 +297,7 @@ def mechanize(
     right = rotation(angular_rate[0] * half, angular_rate[1] * half, angular_rate[2] * half)
     middle = product(product(left, load_matrix(attitude)), right)
     force = transform(middle, specific_force[0], specific_force[1], specific_force[2])
-    other = mean_gravity_and_coriolis(latitude, height, east, north, up, force[0], force[1], force[2], dt)
+    other = mean_gravity_and_coriolis(latitude, height, east, north, up, force, dt)
     new_east = east + dt * (force[0] + other[0])
     new_north = north + dt * (force[1] + other[1])
     new_up = up + dt * (force[2] + other[2])
@@ -349,9 +339,8 @@ def _invert(
         change = (new_east - east) / dt, (new_north - north) / dt, (new_up - up) / dt
         other = gravity_and_coriolis(latitude, height, east, north, up)
         for _ in range(_INVERSION_ITERATIONS):
-            other = mean_gravity_and_coriolis(
-                latitude, height, east, north, up, change[0] - other[0], change[1] - other[1], change[2] - other[2], dt
-            )
+            force = change[0] - other[0], change[1] - other[1], change[2] - other[2]
+            other = mean_gravity_and_coriolis(latitude, height, east, north, up, force, dt)
         force = transform(transpose(middle), change[0] - other[0], change[1] - other[1], change[2] - other[2])
         for axis in range(3):
             angular_rate[i, axis] = turn[axis] / dt

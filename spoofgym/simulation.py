@@ -53,13 +53,14 @@ class Simulation:
         num_runs: int = 1,
         seed: int | None = None,
         *,
+        streams: RunStreams | None = None,
         fidelity: str = "linear",
         threads: int = 1,
         demands: Demands = NO_DEMANDS,
         confounders: Confounders | None = None,
         on_divergence: str = "raise",
     ) -> None:
-        """Set up ``num_runs`` runs seeded ``seed + i``.
+        """Set up ``num_runs`` runs seeded ``seed + i``, or with given random streams.
 
         Args:
             scenario: what is simulated.
@@ -68,6 +69,7 @@ class Simulation:
             response: decides in `resolve` where the caller does not; None = use every fix.
             num_runs: N.
             seed: of run 0; None = fresh entropy.
+            streams: random streams of the N runs, instead of a seed; None = those of the seed.
             fidelity: "linear" or "strapdown".
             threads: for slices of runs.
             demands: of a defender outside, beside those of detectors and response.
@@ -76,8 +78,9 @@ class Simulation:
                 at its last valid solution, and ``navigator.diverged`` tells, for a caller that ends its game.
 
         Raises:
-            ValueError: no runs, an uncalibrated detector or one that alarms in every clean run, a fidelity that the
-                scenario lacks, an attack outside the game, or a part that needs what the scenario does not give.
+            ValueError: no runs, a seed beside streams or streams of another number of runs, an uncalibrated detector
+                or one that alarms in every clean run, a fidelity that the scenario lacks, an attack outside the game,
+                or a part that needs what the scenario does not give.
             TypeError: a part that is no object of its class.
         """
         validation.instance(OWNER, "scenario", scenario, Scenario, "a scenario, as make_scenario gives")
@@ -87,7 +90,7 @@ class Simulation:
         self.scenario = scenario
         self.fidelity = fidelity
         self.num_runs = num_runs
-        self.streams = RunStreams.from_seed(validation.seed(OWNER, seed), num_runs)
+        self.streams = _streams(seed, streams, num_runs)
         for detector in detectors:
             validation.instance(OWNER, "detectors", detector, Detector, "detectors, as make_detector gives")
         self.detectors = {detector.name: detector for detector in detectors}
@@ -420,6 +423,17 @@ class Simulation:
             part.reset(np.arange(len(runs)))
             self.decision = self.decision.put(runs, part.decide(self._seen_by_response(epoch), self.alarm[runs]))
             self.response.take(runs, part)
+
+
+def _streams(seed: int | None, streams: RunStreams | None, num_runs: int) -> RunStreams:
+    """The given random streams, or those of a seed."""
+    if streams is None:
+        return RunStreams.from_seed(validation.seed(OWNER, seed), num_runs)
+    validation.instance(OWNER, "streams", streams, RunStreams, "random streams, or None")
+    validation.at_most_one(OWNER, seed=seed, streams=streams)
+    if len(streams) != num_runs:
+        raise ValueError(f"{OWNER}: streams must be those of {num_runs} runs, got {len(streams)}")
+    return streams
 
 
 class _Trial(Simulation):

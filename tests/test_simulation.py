@@ -16,6 +16,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.liu_flight import liu_flight
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
 
 pytestmark = pytest.mark.xdist_group("simulation")
 FIDELITIES = ("linear", "strapdown")
@@ -309,3 +310,15 @@ def test_a_burn_in_for_another_detector_changes_nothing_for_one_without_memory(f
     np.testing.assert_array_equal(simulation.navigator.auxiliary_offset, 0.0)
     simulation.resolve()
     assert np.all(simulation.navigator.auxiliary_offset[:, :2] != 0.0)
+
+
+def test_given_streams_are_those_of_a_seed():
+    given = simulation(matched(), 4, seed=None, streams=RunStreams.from_seed(60, 4))
+    np.testing.assert_array_equal(record(given), record(simulation(matched(), 4, seed=60)))
+
+
+def test_streams_beside_a_seed_or_of_another_number_of_runs_are_refused():
+    with pytest.raises(ValueError, match="at most one of seed, streams"):
+        Simulation(matched(), num_runs=3, seed=1, streams=RunStreams.from_seed(1, 3))
+    with pytest.raises(ValueError, match="streams must be those of 3 runs, got 2"):
+        Simulation(matched(), num_runs=3, streams=RunStreams.from_seed(1, 2))

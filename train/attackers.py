@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from agents.baselines import Baseline, known_baselines, searched_baselines
-from agents.learned import LearnedSpoofer
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
-from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.evaluation.metrics import attacker_score
+from spoofgym.envs.trained import spoofer_config
+from spoofgym.evaluation.metrics import attacker_score, undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
 from spoofgym.evaluation.report import attacker_row
 from spoofgym.optimum import expected_play
+from spoofgym.policies.baselines import Baseline, known_baselines, searched_baselines
+from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 from train.trained_on import tell_what_is_new
@@ -66,7 +66,7 @@ class Evaluation:
             with console.status(policy.name):
                 score = attacker_score(self.play_policy(policy))
                 exact = self.exact(policy)
-            rows.append(attacker_row(policy.name, policy.config.knowledge, score, exact, optimum))
+            rows.append(attacker_row(policy.name, spoofer_config(policy).knowledge, score, exact, optimum))
         return rows
 
     def check_attacks(self, attacks: list[Attack]) -> None:
@@ -89,13 +89,13 @@ class Evaluation:
                 fields = self._game(policy, 1).fields
             except ValueError as error:
                 raise ValueError(f"policy {policy.name!r}: {error}") from error
-            policy.check_layout(fields)
+            policy.check_layout([field.name for field in fields])
         tell_what_is_new(policies, self.scenario, self.fidelity, self.detectors)
 
     def _baselines(self) -> list[Baseline]:
         if self.threshold is not None:
             return known_baselines(self.scenario, self.threshold)
-        return searched_baselines(self.scenario, self.play)
+        return searched_baselines(self.scenario, self._mean_score)
 
     def _row(self, baseline: Baseline, optimum: float | None, console: Console) -> dict[str, Any]:
         score = None
@@ -103,6 +103,10 @@ class Evaluation:
             with console.status(baseline.name):
                 score = attacker_score(self.play(baseline.attack, self.episodes))
         return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
+
+    def _mean_score(self, attack: Attack, episodes: int) -> float:
+        """Mean undetected error of an attack, m."""
+        return float(np.mean(undetected_error(self.play(attack, episodes))))
 
     def play(self, attack: Attack, episodes: int) -> Episodes:
         """Games of an attack."""
@@ -118,8 +122,8 @@ class Evaluation:
 
     def _game(self, policy: LearnedSpoofer, lanes: int) -> SpooferGame:
         """The evaluated game as this policy sees it: its own knowledge, action, memory and shadow filter."""
-        config: SpooferConfig = replace(
-            policy.config,
+        config = replace(
+            spoofer_config(policy),
             scenario=self.scenario,
             detector=tuple(self.detectors),
             fidelity=self.fidelity,
@@ -140,7 +144,8 @@ class Evaluation:
 
         The policy may choose them by the shadow filter of another model: what they are worth is the victim's to say.
         """
-        if self.threshold is None or policy.config.knowledge == "full" or policy.config.tracking_sigma:
+        config = spoofer_config(policy)
+        if self.threshold is None or config.knowledge == "full" or config.tracking_sigma:
             return None
         offsets = offsets_without_chance(self._game(policy, 1), policy.act)
         return float(expected_play(self.scenario.linear_model(), offsets, self.threshold).score)

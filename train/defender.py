@@ -22,7 +22,6 @@ import torch
 from rich.console import Console
 from stable_baselines3 import PPO
 
-from agents.learned import POLICY_FILE, LearnedDefender
 from spoofgym import files
 from spoofgym.calibration import calibrated_all
 from spoofgym.command_line import Parser
@@ -30,6 +29,7 @@ from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.evaluation.defence import World, play_policy
+from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
 from spoofgym.program import INTERRUPTED, program
 from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario

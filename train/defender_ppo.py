@@ -22,12 +22,11 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 from torch import nn
 
-from agents.learned import LearnedDefender
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import EXCLUDE
-from spoofgym.envs.range_features import SLOT_FIELD
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
+from spoofgym.policies.learned import SLOT_FIELD, LearnedDefender
 from train import limits
 from train.imitation import imitate
 from train.ppo import LAST_RATE, arrays
@@ -281,4 +280,4 @@ def export(learner: PPO, config: DefenderConfig, folder: Path) -> LearnedDefende
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
     vector: DefenderVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
     layout = tuple(field.name for field in vector.game.fields)
-    return LearnedDefender(folder.resolve().name, config, layout, *arrays(layers))
+    return LearnedDefender(folder, dict(vars(config)), layout, *arrays(layers))

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from agents.defenders import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
-from agents.learned import LearnedDefender
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
 from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.trained import defender_config
 from spoofgym.evaluation.defence import (
     DefenceEpisodes,
     World,
@@ -27,6 +27,8 @@ from spoofgym.evaluation.defence import (
 )
 from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, difference, paired_difference
 from spoofgym.evaluation.report import defenders_report
+from spoofgym.policies.classical import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
+from spoofgym.policies.learned import LearnedDefender
 from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 from train.trained_on import tell_what_is_new
@@ -69,11 +71,17 @@ def world_of(
         ValueError: a detector cannot be built, or one that a policy or a defender watches does not fit the scenario.
     """
     common = [name for name in WORLD_DETECTORS if fits(name, scenario)]
-    wanted = [str(part) for policy in policies for part in policy.config.detectors]
+    wanted = [str(part) for policy in policies for part in _watched(policy)]
     names = dict.fromkeys([*common, *wanted, *(item.detector for item in classical)])
     built = {detector.name: detector for detector in map(make_detector, names)}
     detectors = tuple(calibrated_all(list(built.values()), scenario))
     return World(scenario, attacks, 0.5, detectors, fidelity=fidelity, threads=threads)
+
+
+def _watched(policy: LearnedDefender) -> tuple[str | Detector, ...]:
+    """The detectors whose statistics a policy sees."""
+    detectors = defender_config(policy).detectors
+    return detectors if isinstance(detectors, tuple) else (detectors,)
 
 
 def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
@@ -83,9 +91,9 @@ def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
         ValueError: a policy was trained on another observation, or on another number of depths.
     """
     for policy in policies:
-        config = replace(policy.config, scenario=world.scenario, fidelity=world.fidelity)
+        config = replace(defender_config(policy), scenario=world.scenario, fidelity=world.fidelity)
         game = DefenderGame(config, 1, world.detectors)
-        policy.check_layout(game.fields)
+        policy.check_layout([field.name for field in game.fields])
         if policy.depths != len(game.depths):
             raise ValueError(
                 f"policy {policy.name!r} was trained on {policy.depths} depths, the game has {len(game.depths)}"
@@ -138,7 +146,7 @@ class Defenders:
         if best is not None:
             yield self._played(ORACLE_DEPTH, "yardstick", lambda: self.oracle_depth(best))
         for policy in policies:
-            games = partial(play_policy, world, policy.config, policy.act, episodes, seed)
+            games = partial(play_policy, world, defender_config(policy), policy.act, episodes, seed)
             yield self._played(policy.name, "learned", games)
 
     def _played(self, name: str, kind: str, games: Callable[[], DefenceEpisodes]) -> Played:

@@ -20,9 +20,6 @@ from typing import Any
 
 from rich.console import Console, RenderableType
 
-from agents.baselines import exact_threshold
-from agents.defenders import parse
-from agents.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
@@ -31,6 +28,9 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
+from spoofgym.policies.baselines import exact_threshold
+from spoofgym.policies.classical import parse
+from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import FIDELITIES, Scenario
 from spoofgym.scenarios import make_scenario

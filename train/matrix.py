@@ -8,16 +8,17 @@ from typing import Any
 
 from rich.console import Console
 
-from agents.learned import LearnedSpoofer
-from agents.oracles import ORACLES, oracles
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
 from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack, watch_policy
+from spoofgym.policies.learned import LearnedSpoofer
+from spoofgym.policies.optimal import ORACLES, oracles
 from spoofgym.scenario import Scenario
 from train.trained_on import tell_what_is_new
 
@@ -106,7 +107,7 @@ class Matrix:
                 statistics.
         """
         for policy in policies:
-            if policy.config.knowledge == "full":
+            if spoofer_config(policy).knowledge == "full":
                 raise ValueError(
                     f"policy {policy.name!r} sees the statistics of its own detector (knowledge 'full'): the matrix "
                     "takes policies that know less, 'blind' or 'shadow'"
@@ -175,14 +176,14 @@ class Matrix:
     def _play_policy(self, policy: LearnedSpoofer, detectors: list[Detector]) -> WatchedEpisodes:
         def make(lanes: int) -> SpooferGame:
             config = replace(
-                policy.config,
+                spoofer_config(policy),
                 scenario=self.scenario,
                 detector=tuple(detectors),
                 fidelity=self.fidelity,
                 threads=self.threads,
             )
             game = SpooferGame(config, lanes)
-            policy.check_layout(game.fields)
+            policy.check_layout([field.name for field in game.fields])
             return game
 
         return watch_policy(make, policy.act, self.episodes, self.seed)

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
-from agents.learned import LearnedSpoofer
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import SpooferVectorEnv
+from spoofgym.policies.learned import LearnedSpoofer
 from train import limits
 from train.expected_alarm import ExpectedAlarmVectorEnv, alarm_probability_is_known
 
@@ -110,11 +110,11 @@ def _lanes(config: SpooferConfig, lanes: int) -> SpooferVectorEnv:
 
 
 def export(learner: PPO, config: SpooferConfig, folder: Path) -> LearnedSpoofer:
-    """The learner's policy as plain arrays, named after its run folder."""
+    """The learner's policy as plain arrays."""
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
     vector: SpooferVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
     layout = tuple(field.name for field in vector.game.fields)
-    return LearnedSpoofer(folder.resolve().name, config, layout, *arrays(layers))
+    return LearnedSpoofer(folder, dict(vars(config)), layout, *arrays(layers))
 
 
 Arrays = tuple[NDArray[np.float32], ...]

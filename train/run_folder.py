@@ -17,7 +17,6 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from agents.learned import CONFIG_FILE, environment_of, read_config
 from spoofgym import files
 from spoofgym.command_line import (
     LARGEST_LEARNER_SEED,
@@ -28,6 +27,8 @@ from spoofgym.command_line import (
     run_folder,
     threads,
 )
+from spoofgym.envs.trained import config_from
+from spoofgym.policies.learned import CONFIG_FILE, read_config
 from train import checkpoint
 
 CHECKPOINT_FILE = "checkpoint.pt"
@@ -141,9 +142,7 @@ class RunFolder:
         path = self.path / CONFIG_FILE
         environment_type, learner_type = self._types
         content = read_config(self.path)
-        environment = environment_of(environment_type, content, path)
-        if isinstance(getattr(environment, "detectors", None), list):
-            environment = replace(environment, detectors=tuple(environment.detectors))
+        environment: Any = config_from(environment_type, content["environment"], path)
         with files.reading(path):
             known = {field.name for field in fields(learner_type)}
             if set(content["learner"]) != known:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agents.learned import LearnedPolicy
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.trained import defender_config, spoofer_config
+from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.program import say
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
 
 def tell_what_is_new(
-    policies: Sequence[LearnedPolicy],
+    policies: Sequence[LearnedSpoofer | LearnedDefender],
     scenario: Scenario,
     fidelity: str,
     detectors: Sequence[Detector] | None = None,
@@ -33,17 +35,17 @@ def tell_what_is_new(
 
 
 def what_is_new(
-    policy: LearnedPolicy, scenario: Scenario, fidelity: str, detectors: Sequence[Detector] | None
+    policy: LearnedSpoofer | LearnedDefender, scenario: Scenario, fidelity: str, detectors: Sequence[Detector] | None
 ) -> list[str]:
     """In what a game differs from the one that a policy was trained on."""
-    config = policy.config
+    config = spoofer_config(policy) if isinstance(policy, LearnedSpoofer) else defender_config(policy)
     pairs = [
-        ("scenario", scenario.name, _scenario_name(config.scenario, config.coupling)),
+        ("scenario", scenario.name, _scenario_name(str(config.scenario), config.coupling)),
         ("fidelity", fidelity, config.fidelity),
     ]
-    if detectors is not None:
-        given = [config.detector] if isinstance(config.detector, str) else list(config.detector)
-        trained = ", ".join(make_detector(part).name for part in given)
+    if isinstance(config, SpooferConfig) and detectors is not None:
+        given = config.detector if isinstance(config.detector, tuple) else (config.detector,)
+        trained = ", ".join(make_detector(str(part)).name for part in given)
         pairs.append(("detector", ", ".join(detector.name for detector in detectors), trained))
     return [f"{what} {here} (trained: {there})" for what, here, there in pairs if here != there]
 

@@ -2,8 +2,8 @@
 
     python -m train.tune --scenario foi-drive --json out.json
 
-Plays every defender of the grid (`agents.defenders.grid`: detector x depth or estimated onset x epochs until re-use) on
-the same games and prints the best. What it finds stands in `agents.defenders.TUNED`.
+Plays every defender of the grid (`spoofgym.policies.classical.grid`: detector x depth or estimated onset x epochs until
+re-use) on the same games and prints the best. `spoofgym.policies.classical.TUNED` holds what it found.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any
 
 from rich.table import Table
 
-from agents.defenders import grid
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.defence import play_response
 from spoofgym.evaluation.defence_metrics import defender_score
+from spoofgym.policies.classical import grid
 from spoofgym.program import do_all, give_json, program
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario

@@ -22,9 +22,6 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from agents.baselines import exact_threshold
-from agents.learned import LearnedSpoofer
-from agents.scripted import OffsetSequence
 from spoofgym.arrays import Floats
 from spoofgym.calibration import calibrated
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
@@ -33,10 +30,14 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot
 from spoofgym.envs.shadow import shadow_model
+from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.metrics import NORMAL_95, attacker_score, undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes
 from spoofgym.evaluation.report import SCHEMA_VERSION, detector_entry
 from spoofgym.optimum import bounded_optimum, expected_play
+from spoofgym.policies.baselines import exact_threshold
+from spoofgym.policies.learned import LearnedSpoofer
+from spoofgym.policies.scripted import OffsetSequence
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario, SimulatedScenario
 from spoofgym.scenarios import make_scenario
@@ -111,7 +112,7 @@ def check_trained_against_snapshot(policy: LearnedSpoofer) -> None:
     Raises:
         ValueError: telling what it was trained against.
     """
-    given = policy.config.detector
+    given = spoofer_config(policy).detector
     trained = [make_detector(item) for item in ((given,) if isinstance(given, str | Detector) else given)]
     if len(trained) != 1 or not isinstance(trained[0], Snapshot):
         raise ValueError(
@@ -271,7 +272,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     )
     policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
     for policy in policies:
-        if policy.config.knowledge == "blind":
+        if spoofer_config(policy).knowledge == "blind":
             raise ValueError(f"policy {policy.name!r} is blind: it has no shadow filter that could be wrong")
         check_trained_against_snapshot(policy)
     evaluation.check_layouts(policies)

@@ -163,20 +163,49 @@ def measure_arl0(
     Raises:
         ValueError: every run alarms in its burn-in, or ``threshold`` or ``min_epochs`` is not a positive finite number.
     """
-    validation.above("calibration", "threshold", threshold)
+
+    def alone(detectors: Sequence[Detector], runs: int, rng: np.random.Generator) -> list[tuple[Floats, Floats]]:
+        return [clean(detectors[0], runs, rng)]
+
+    return measure_together([detector], alone, [threshold], min_epochs=min_epochs, seed=seed)[0]
+
+
+def measure_together(
+    detectors: Sequence[Detector],
+    clean: JointStatistics,
+    thresholds: Sequence[float],
+    *,
+    min_epochs: float,
+    seed: int = 0,
+) -> list[Calibration]:
+    """ARL₀ of several detectors, each at its given threshold, on common clean runs.
+
+    Args:
+        detectors: whose statistics; they are not changed.
+        clean: where clean statistics come from.
+        thresholds: one of each detector.
+        min_epochs: clean epochs at risk that each detector sees at least.
+        seed: of the clean runs.
+
+    Raises:
+        ValueError: every run alarms in its burn-in, or a threshold or ``min_epochs`` is not a positive finite number.
+    """
     validation.above("calibration", "min_epochs", min_epochs)
+    for threshold in thresholds:
+        validation.above("calibration", "threshold", threshold)
     rng = np.random.default_rng(seed)
-    alarms = at_risk = 0
-    while at_risk < min_epochs:
-        burn_in, statistics = clean(copy.copy(detector), RUNS, rng)
-        counted = FirstAlarms()
-        counted.forget_below(threshold)
-        counted.add(burn_in, statistics)
-        more_alarms, more_at_risk = counted.at(threshold)
-        if more_at_risk == 0:
-            raise ValueError(f"threshold {written(threshold)}: every clean run alarms in its burn-in")
-        alarms, at_risk = alarms + more_alarms, at_risk + more_at_risk
-    return _calibration(threshold, alarms, at_risk)
+    alarms, at_risk = [0] * len(detectors), [0] * len(detectors)
+    while min(at_risk) < min_epochs:
+        found = clean([copy.copy(detector) for detector in detectors], RUNS, rng)
+        for place, (threshold, (burn_in, statistics)) in enumerate(zip(thresholds, found, strict=True)):
+            counted = FirstAlarms()
+            counted.forget_below(threshold)
+            counted.add(burn_in, statistics)
+            more_alarms, more_at_risk = counted.at(threshold)
+            if more_at_risk == 0:
+                raise ValueError(f"threshold {written(threshold)}: every clean run alarms in its burn-in")
+            alarms[place], at_risk[place] = alarms[place] + more_alarms, at_risk[place] + more_at_risk
+    return [_calibration(*result) for result in zip(thresholds, alarms, at_risk, strict=True)]
 
 
 # --- detectors ready for a scenario ---------------------------------------------------------------------------------

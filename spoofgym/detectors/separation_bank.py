@@ -11,7 +11,7 @@ from spoofgym.detectors.separation_theory import protection_level, separation_th
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.navigation.separation.coasting import coasting_tables
-from spoofgym.navigation.separation.windows import CoastingWindows
+from spoofgym.navigation.separation.windows import CoastingWindows, OwnFilters, Separated
 from spoofgym.specification import spell
 
 DEFAULT_WINDOW = 60
@@ -129,7 +129,7 @@ class SeparationBank(ThresholdDetector):
         self.coasting_sigma = np.sqrt(np.add.reduce(coasting**2, axis=1))
         return ratio / self.multiplier
 
-    def _separate(self, epoch: Epoch, limit: float) -> tuple[Floats, Floats, Floats]:
+    def _separate(self, epoch: Epoch, limit: float) -> Separated:
         row, whitened, view = epoch.index + self.n - 1, epoch.innovation.whitened, epoch.view
         # the navigator's own covariances begin at epoch 0; in a burn-in every range is used
         if view is None or view.shared_gains or (epoch.index < 0).any():
@@ -139,11 +139,13 @@ class SeparationBank(ThresholdDetector):
             row,
             whitened,
             limit,
-            view.auxiliary,
-            view.inertial_covariance,
-            view.position_gain,
-            _given(epoch),
-            view.backtracked,
+            OwnFilters(
+                auxiliary=view.auxiliary,
+                covariance=view.inertial_covariance,
+                gain=view.position_gain,
+                given=_given(epoch),
+                backtracked=view.backtracked,
+            ),
         )
 
 

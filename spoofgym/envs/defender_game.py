@@ -27,6 +27,7 @@ from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
 
 OWNER = "Defender-v0"
 USE, EXCLUDE = 0, 1
@@ -80,7 +81,15 @@ class DefenderGame:
         excluding: whether the last decision was to exclude, (N,).
     """
 
-    def __init__(self, config: DefenderConfig, num_lanes: int, beside: Sequence[Detector] = ()) -> None:
+    def __init__(
+        self,
+        config: DefenderConfig,
+        num_lanes: int,
+        beside: Sequence[Detector] = (),
+        *,
+        streams: RunStreams | None = None,
+        disturbances: Disturbances | None = None,
+    ) -> None:
         """Set the game up.
 
         Args:
@@ -88,6 +97,8 @@ class DefenderGame:
             num_lanes: N.
             beside: detectors, with their thresholds, among which are all of the game's own: the simulation runs these,
                 the defender sees its own.
+            streams: random streams of the lanes; None = of fresh entropy, until the lanes are seeded.
+            disturbances: of the receiver, in place of those of ``config``.
 
         Raises:
             ValueError: a part that is unknown or does not fit the scenario.
@@ -116,7 +127,8 @@ class DefenderGame:
         self.depths: Runs = np.array(scenario.depth_table, dtype=np.int64)
         with validation.argument(OWNER, "attacks"):
             self.attacks = opponents(config.attacks, config.clean)
-        self.confounders = Confounders(Disturbances(outage_share=config.outage, multipath_share=config.multipath))
+        shares = Disturbances(outage_share=config.outage, multipath_share=config.multipath)
+        self.confounders = Confounders(shares if disturbances is None else disturbances)
         self.simulation = Simulation(
             scenario,
             self.attacks,
@@ -128,6 +140,7 @@ class DefenderGame:
             demands=Demands(excludes=True, history=max(scenario.history, int(self.depths.max()))),
             confounders=self.confounders,
             on_divergence="hold",
+            streams=streams,
         )
         self.features = DefenderFeatures(scenario, self.simulation, names, num_lanes)
         self.privileged = PrivilegedState(self.simulation, self.attacks, self.confounders, scenario.defender_scale)

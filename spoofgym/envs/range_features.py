@@ -14,13 +14,12 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.envs.observation import Field
+from spoofgym.policies.learned import SLOT_FIELD
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 
 HORIZONTAL_FACTOR, VERTICAL_FACTOR = 6.0, 5.33
 """K of the filter's own protection levels: K_H and K_V of RTCA DO-229 for approaches with vertical guidance."""
-SLOT_FIELD = "satellite in slot"
-"""How the names of the entries begin that tell which slots hold a satellite."""
 BEYOND = 1e6
 """Protection levels over their alert limits count as at most this: an infinite one has no squashed form."""
 

@@ -29,6 +29,7 @@ from spoofgym.responses.base import Response
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
 
 OWNER = "Spoofer-v0"
 MOST_ENTRIES = 2**26
@@ -76,8 +77,13 @@ class SpooferGame:
             clock, m, where the filter takes ranges.
     """
 
-    def __init__(self, config: SpooferConfig, num_lanes: int) -> None:
+    def __init__(self, config: SpooferConfig, num_lanes: int, *, streams: RunStreams | None = None) -> None:
         """Set the game up.
+
+        Args:
+            config: its arguments.
+            num_lanes: N.
+            streams: random streams of the lanes; None = of fresh entropy, until the lanes are seeded.
 
         Raises:
             ValueError: a part that is unknown or does not fit the scenario.
@@ -119,6 +125,7 @@ class SpooferGame:
             fidelity=config.fidelity,
             threads=config.threads,
             on_divergence="hold",
+            streams=streams,
         )
         self.scenario = scenario
         self.num_lanes = num_lanes

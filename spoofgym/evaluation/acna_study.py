@@ -138,16 +138,15 @@ def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, 
     right, false, missed = np.zeros(pairs), np.zeros(pairs), np.zeros(pairs)
     clean = spoofed = 0
     for run in range(runs):
+        parent = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed + run)))
         simulation = Simulation(
             make_scenario(scenario),
             make_attack(ATTACKS[test]),
             [OneTest(test, epochs, thresholds)],
             Exclude(),
             pairs,
-            seed + run,
+            streams=RunStreams([parent] * pairs),
         )
-        parent = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed + run)))
-        simulation.streams = RunStreams([parent] * pairs)
         simulation.reset()
         for _ in range(simulation.scenario.timeline.num_epochs):
             simulation.resolve()

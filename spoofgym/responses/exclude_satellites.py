@@ -13,6 +13,8 @@ chi-square with two degrees of freedom under a matched filter: what it measures 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from spoofgym import validation
@@ -107,50 +109,63 @@ class ExcludeSatellites(Response):
         if not self._left_out.shape[1]:
             self._allot(present.shape[1] // BOTH)
         fix = given(epoch)
-        _judge(
-            innovation.covariance,
-            innovation.response,
-            innovation.whitened,
-            present,
-            fix,
-            (self.threshold, self.reuse_threshold),
-            self.reuse,
-            self._left_out,
-            self._agreed,
-        )
+        ranges = Ranges(innovation.covariance, innovation.response, innovation.whitened, present)
+        rule = Rule(self.threshold, self.reuse_threshold, self.reuse)
+        _judge(ranges, fix, rule, self._left_out, self._agreed)
         return Decision(fix.copy(), satellites=~self._left_out if self._left_out.any() else None)
 
 
+class Ranges(NamedTuple):
+    """The innovations of the present ranges; m = 2 S.
+
+    Attributes:
+        covariance: S, (N, m, m).
+        response: L⁻¹ H on the position, (N, m, 3), 1/m.
+        whitened: (N, m).
+        present: whether each measurement is there, (N, m).
+    """
+
+    covariance: Floats
+    response: Floats
+    whitened: Floats
+    present: Flags
+
+
+class Rule(NamedTuple):
+    """When a satellite is left out, and when it is used again.
+
+    Attributes:
+        threshold: of the squared residual of a satellite in use.
+        reuse_threshold: of the squared residual of one that is left out.
+        reuse: epochs in a row below it.
+    """
+
+    threshold: float
+    reuse_threshold: float
+    reuse: int
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _judge(
-    covariance: Floats,
-    response: Floats,
-    whitened: Floats,
-    present: Flags,
-    fix: Flags,
-    thresholds: tuple[float, float],
-    reuse: int,
-    left_out: Flags,
-    agreed: Runs,
-) -> None:
-    """Who is left out in each run; the last two, (N, S), in place."""
+def _judge(ranges: Ranges, fix: Flags, rule: Rule, left_out: Flags, agreed: Runs) -> None:
+    """Who is left out in each run with a fix, (N,); the last two, (N, S), in place."""
+    present = ranges.present
     m, slots = present.shape[1], left_out.shape[1]
     factor, columns, basis = np.empty((m, m)), np.empty((m, m)), np.empty((m, m))
     for run in range(len(fix)):
         if not fix[run]:
             continue
-        inverse_columns(covariance[run], present[run], factor, columns)
+        inverse_columns(ranges.covariance[run], present[run], factor, columns)
         used = 0
         for i in range(slots):
             if not present[run, i]:
                 left_out[run, i], agreed[run, i] = False, 0
             used += present[run, i] and not left_out[run, i]
         while used >= LEAST_TO_JUDGE:
-            size = nuisance_basis(response[run], factor, columns, left_out[run], -1, basis)
-            worst, largest = -1, thresholds[0]
+            size = nuisance_basis(ranges.response[run], factor, columns, left_out[run], -1, basis)
+            worst, largest = -1, rule.threshold
             for i in range(slots):
                 if present[run, i] and not left_out[run, i]:
-                    square = squared_residual(basis, size, columns, i, whitened[run])
+                    square = squared_residual(basis, size, columns, i, ranges.whitened[run])
                     if square > largest:
                         worst, largest = i, square
             if worst < 0:
@@ -159,11 +174,11 @@ def _judge(
             used -= 1
         for i in range(slots):
             if left_out[run, i]:
-                size = nuisance_basis(response[run], factor, columns, left_out[run], i, basis)
-                square = squared_residual(basis, size, columns, i, whitened[run])
-                agreed[run, i] = agreed[run, i] + 1 if square < thresholds[1] else 0
+                size = nuisance_basis(ranges.response[run], factor, columns, left_out[run], i, basis)
+                square = squared_residual(basis, size, columns, i, ranges.whitened[run])
+                agreed[run, i] = agreed[run, i] + 1 if square < rule.reuse_threshold else 0
         for i in range(slots):
-            if left_out[run, i] and agreed[run, i] >= reuse:
+            if left_out[run, i] and agreed[run, i] >= rule.reuse:
                 left_out[run, i], agreed[run, i] = False, 0
 
 

@@ -1,5 +1,6 @@
 """Results of calibration on disk: read only by the code that made them, and no trouble where there is no disk."""
 
+import ast
 import dataclasses
 import json
 import os
@@ -19,12 +20,8 @@ from spoofgym.scenarios import make_scenario
 
 SCENARIO = "liu-flight:horizon=30"
 NAME = "0" * 64
+PACKAGE = Path(spoofgym.__file__).parent
 SETTING = Setting(12.5, 1000.25, 0.1 + 0.2)
-WITHOUT_EFFECT = (
-    *("responses", "immutable", "kernels", "cache_folder", "calibration_cache"),
-    *("command_line", "files", "program"),
-)
-"""What calibration imports, directly or through the simulation, and what decides no clean statistic."""
 
 
 @pytest.fixture(autouse=True)
@@ -192,33 +189,75 @@ def test_other_code_or_settings_make_another_result(place, monkeypatch):
     assert len({calibration_cache.key(*parts) for parts in different}) == len(different)
 
 
-def test_the_digest_covers_what_decides_a_result(monkeypatch, package_copy):
-    copy = package_copy
-    monkeypatch.setattr(spoofgym, "__file__", str(copy / "__init__.py"))
+def imported_by(module: str) -> set[Path]:
+    """The modules of the package that a module imports, directly or through others, itself included.
+
+    The statements are read, and not followed at run time, so that an import within a function counts, too.
+    """
+    found: set[Path] = set()
+    names = [module]
+    while names:
+        name = names.pop()
+        path = file_of(name)
+        if path is None or path in found:
+            continue
+        found.add(path)
+        names.append(name.rpartition(".")[0])
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level == 0
+                names += [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return found
+
+
+def file_of(module: str) -> Path | None:
+    if module.partition(".")[0] != "spoofgym":
+        return None
+    place = PACKAGE.parent.joinpath(*module.split("."))
+    return next((path for path in (place / "__init__.py", place.with_suffix(".py")) if path.is_file()), None)
+
+
+def test_every_byte_of_what_a_threshold_depends_on_is_in_the_digest(monkeypatch, package_copy):
+    depends = {path.relative_to(PACKAGE) for path in imported_by("spoofgym.calibration.thresholds")}
+    assert {"simulation.py", "sensors", "navigation", "detectors", "scenarios"} <= {path.parts[0] for path in depends}
+    assert any(len(path.parts) > 2 for path in depends)  # a folder within a folder
+    monkeypatch.setattr(spoofgym, "__file__", str(package_copy / "__init__.py"))
     before = calibration_cache._source()
+    assert before == calibration_cache._source() != ""
+    silent = []
+    for path in sorted(depends):
+        whole = (package_copy / path).read_bytes()
+        (package_copy / path).write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]) if whole else b"#")
+        if calibration_cache._source() == before:
+            silent.append(path.as_posix())
+        (package_copy / path).write_bytes(whole)
+    assert silent == []
     assert before == calibration_cache._source()
-    for name in ("envs/config.py", "responses/base.py"):
-        (copy / name).write_text("# another environment\n")
+
+
+def test_what_a_program_imports_to_calibrate_is_what_its_statements_say():
+    """The imports that are read above leave out none that happens."""
+    command = "import sys, spoofgym.calibration; print(*(name for name in sys.modules if name.startswith('spoofgym')))"
+    names = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True).stdout.split()
+    assert len(names) > 50
+    assert {file_of(name) for name in names} <= imported_by("spoofgym.calibration.thresholds")
+
+
+def test_the_digest_leaves_out_what_uses_calibration_only(monkeypatch, package_copy):
+    """A change of an environment or of a program throws no thresholds away; a new room counts, at any depth."""
+    monkeypatch.setattr(spoofgym, "__file__", str(package_copy / "__init__.py"))
+    before = calibration_cache._source()
+    for name in ("envs/spoofer.py", "evaluation/metrics.py", "console.py"):
+        (package_copy / name).write_text("# another one\n")
     assert calibration_cache._source() == before
     digests = {before}
-    for name in (
-        *("sensors/imu.py", "navigation/kalman.py", "detectors/ring.py", "scenarios/liu_flight.py", "attacks/base.py"),
-        *("simulation.py", "scenario.py", "trajectory.py", "geodesy.py"),
-        *("calibration/thresholds.py", "calibration/first_alarms.py"),
-    ):
-        (copy / name).write_text((copy / name).read_text() + "\n")
+    for folder in (package_copy, package_copy / "navigation", package_copy / "annex" / "attic"):
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "added.py").write_text("")
         digests.add(calibration_cache._source())
-    assert len(digests) == 12
-
-
-def test_no_module_of_the_simulation_is_left_out_of_the_digest():
-    """What calibration imports is in the digest, but for what decides no clean statistic."""
-    command = "import sys, spoofgym.calibration; print(*(name for name in sys.modules if name.startswith('spoofgym.')))"
-    names = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True).stdout.split()
-    package = Path(spoofgym.__file__).parent
-    covered = {path for pattern in calibration_cache.SOURCES for path in package.glob(pattern)}
-    left_out = {name for name in names if Path(sys.modules[name].__file__) not in covered}
-    assert {name for name in left_out if name.split(".")[1] not in WITHOUT_EFFECT} == set()
+    assert len(digests) == 4
 
 
 def test_objects_that_their_name_does_not_build_stay_in_memory(place):
@@ -239,6 +278,9 @@ def test_objects_that_their_name_does_not_build_stay_in_memory(place):
 
 def test_together_is_the_same_as_alone(monkeypatch, tmp_path):
     """Coloured noise: the burn-in that one detector needs must not change the runs of another."""
+    for name, value in (("RUNS", 200), ("SLOPE_RUNS", 200), ("SIMULATED_FIRST_ALARMS", 100)):
+        # few runs a pass, so that the detectors need several passes, and not the same number
+        monkeypatch.setattr(calibration, name, value)
     scenario = make_scenario("liu-flight:horizon=30,markov_sigma=2,markov_time=30")
     texts = ("snapshot:arl0=100", "windowed:n=4,arl0=60", "relative-motion:k=5,arl0=100", "signed-mean:arl0=80")
     together = calibrated_all([make_detector(text) for text in texts], scenario)

@@ -14,6 +14,7 @@ from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.defender_game import EXCLUDE, USE, DefenderGame
 from spoofgym.envs.vector import DefenderVectorEnv
+from spoofgym.streams import RunStreams
 
 ID = "spoofgym/Defender-v0"
 SHORT = "foi-drive:horizon=60"
@@ -211,8 +212,8 @@ def test_suspicion_is_that_of_the_classical_defender() -> None:
     from spoofgym.simulation import Simulation
 
     lanes = 40
-    game = DefenderGame(DefenderConfig(**QUICK, clean=0.0, outage=0.0), lanes)
-    game.simulation.streams = type(game.simulation.streams).from_seed(0, lanes)
+    config = DefenderConfig(**QUICK, clean=0.0, outage=0.0)
+    game = DefenderGame(config, lanes, streams=RunStreams.from_seed(0, lanes))
     game.reset(np.arange(lanes))
     simulation = Simulation(
         game.scenario,

@@ -31,8 +31,7 @@ Under = Callable[[float, float], TightScenario]
 def defender(lanes: int, seed: int = 5, **arguments: Any) -> DefenderGame:
     """Lanes of a defender's game at epoch 0."""
     given: dict[str, Any] = {"scenario": KUJUR, "detectors": "snapshot", "attacks": "none"} | arguments
-    result = DefenderGame(DefenderConfig(**given), lanes)
-    result.simulation.streams = RunStreams.from_seed(seed, lanes)
+    result = DefenderGame(DefenderConfig(**given), lanes, streams=RunStreams.from_seed(seed, lanes))
     result.reset(np.arange(lanes))
     return result
 

@@ -35,8 +35,8 @@ Under = Callable[[float, float], TightScenario]
 def game(scenario: str | Scenario, lanes: int, seed: int = 7, **arguments: Any) -> SpooferGame:
     """Lanes of a game that no alarm ends, at epoch 0."""
     arguments = {"detector": DEAF, "on_alarm": "respond", "response": "always-use"} | arguments
-    result = SpooferGame(SpooferConfig(scenario=scenario, **arguments), lanes)
-    result.simulation.streams = RunStreams.from_seed(seed, lanes)
+    config = SpooferConfig(scenario=scenario, **arguments)
+    result = SpooferGame(config, lanes, streams=RunStreams.from_seed(seed, lanes))
     result.reset(np.arange(lanes))
     return result
 

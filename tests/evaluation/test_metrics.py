@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from agents.scripted import OffsetSequence, RandomRates
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import attacker_score, mean_interval, undetected_error
 from spoofgym.evaluation.monte_carlo import NEVER, Episodes, play_attack
 from spoofgym.optimum import best_ramp, expected_play
+from spoofgym.policies.scripted import OffsetSequence, RandomRates
 from spoofgym.scenarios import make_scenario
 from spoofgym.timeline import Timeline
 

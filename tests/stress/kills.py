@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from agents.learned import CONFIG_FILE
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
+from spoofgym.policies.learned import CONFIG_FILE
 from train import defender_ppo, ppo
 from train.run_folder import CHECKPOINT_FILE, Run, RunFolder
 

@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents import defenders as listed
-from agents.learned import CONFIG_FILE, POLICY_FILE, LearnedDefender
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
+from spoofgym.envs.trained import defender_config
 from spoofgym.evaluation.defence import World, play_policy, play_response
+from spoofgym.policies import classical as listed
+from spoofgym.policies.learned import CONFIG_FILE, POLICY_FILE, LearnedDefender
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from train import defender, defenders, evaluate, tune
@@ -128,7 +129,7 @@ def test_the_policy_that_is_kept_is_the_best_in_validation(run):
     scenario = make_scenario(SCENARIO)
     world = World(scenario, "training", 0.5, tuple(calibrated_all([make_detector("snapshot")], scenario)))
     policy = LearnedDefender.load(run)
-    games = play_policy(world, policy.config, policy.act, 20, VALIDATION_SEED)
+    games = play_policy(world, defender_config(policy), policy.act, 20, VALIDATION_SEED)
     assert games.error.mean() == min(row["mean_error_m"] for row in validation)
 
 

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from agents.learned import CONFIG_FILE, LearnedSpoofer
+from spoofgym.envs.trained import spoofer_config
+from spoofgym.policies.learned import CONFIG_FILE, LearnedSpoofer
 from train import evaluate, spoofer
 
 SHORT = ["--scenario", "liu-flight:horizon=20", "--threads", "1"]
@@ -21,7 +22,7 @@ def run(tmp_path_factory):
 def test_the_run_folder_keeps_the_memory(run):
     assert json.loads((run / CONFIG_FILE).read_text())["environment"]["frames"] == 3
     policy = LearnedSpoofer.load(run)
-    assert policy.config.frames == 3
+    assert spoofer_config(policy).frames == 3
     assert policy.layout[20] == "offset east, 1 epoch ago"
     assert policy.act(np.zeros((2, 60), dtype=np.float32)).shape == (2, 3)
 
@@ -37,7 +38,7 @@ def test_it_is_evaluated_in_a_game_with_its_memory(run, capsys):
 
 def test_it_can_be_resumed(run):
     assert spoofer.main(["--steps", "20000", "--out", str(run), "--resume"]) == 0
-    assert LearnedSpoofer.load(run).config.frames == 3
+    assert LearnedSpoofer.load(run).configuration["frames"] == 3
 
 
 def test_a_run_folder_without_memory_and_shadow_still_loads(run, tmp_path):
@@ -46,5 +47,5 @@ def test_a_run_folder_without_memory_and_shadow_still_loads(run, tmp_path):
         del content["environment"][key]
     (tmp_path / CONFIG_FILE).write_text(json.dumps(content))
     (tmp_path / "policy.npz").write_bytes((run / "policy.npz").read_bytes())
-    config = LearnedSpoofer.load(tmp_path).config
+    config = spoofer_config(LearnedSpoofer.load(tmp_path))
     assert (config.frames, config.shadow) == (1, None)

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from agents.learned import CONFIG_FILE, POLICY_FILE, LearnedSpoofer
+from spoofgym.policies.learned import CONFIG_FILE, POLICY_FILE, LearnedSpoofer
 from train import evaluate, spoofer
 
 ROW_KEYS = {

@@ -17,9 +17,9 @@ import pytest
 import torch
 from rich.console import Console
 
-from agents.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from spoofgym import files
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
+from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from train import defender, defender_ppo, ppo, spoofer, watch
 from train.run_folder import CHECKPOINT_FILE, Run, RunFolder
 

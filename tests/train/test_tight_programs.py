@@ -9,10 +9,10 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from agents import baselines
-from agents.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.policies import baselines
+from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from train import defender, defender_ppo, defenders, evaluate, imitation, spoofer, wrong_shadow
 from train.defender_ppo import DefenderPolicy
 from train.imitation import Teacher

@@ -1,14 +1,14 @@
 """A policy that plays what it was not trained on is told on one line of stderr, once, and plays."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from agents.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from spoofgym.detectors import make_detector
-from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.observation import spoofer_fields
+from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from train import evaluate, wrong_shadow
 from train.trained_on import what_is_new
@@ -23,7 +23,7 @@ def folder(tmp_path):
     path.mkdir(parents=True)
     layout = tuple(field.name for field in spoofer_fields("shadow", 3, ("snapshot",)))
     zeros = np.zeros((3, len(layout)), dtype=np.float32)
-    LearnedSpoofer(path.name, SpooferConfig(), layout, (zeros,), (zeros[:, 0],)).save(path)
+    LearnedSpoofer(path, {"knowledge": "shadow"}, layout, (zeros,), (zeros[:, 0],)).save(path)
     (path / CONFIG_FILE).write_text(json.dumps({"environment": {"scenario": SCENARIO, "knowledge": "shadow"}}))
     return path
 
@@ -67,13 +67,13 @@ def test_a_wrong_shadow_is_new_by_design_but_another_victim_is_not(folder, capsy
 
 
 def test_specifications_of_one_game_are_no_difference():
-    config = SpooferConfig(scenario="liu-flight:horizon=12,onset=800", detector=["snapshot"])  # type: ignore[arg-type]
-    policy = LearnedSpoofer("x", config, (), (), ())
+    configuration = {"knowledge": "shadow", "scenario": "liu-flight:horizon=12,onset=800", "detector": ["snapshot"]}
+    policy = LearnedSpoofer(Path("x"), configuration, (), (), ())
     assert what_is_new(policy, make_scenario(SCENARIO), "linear", [make_detector("snapshot")]) == []
 
 
 def test_a_defender_is_told_by_scenario_and_fidelity():
-    policy = LearnedDefender("x", DefenderConfig(scenario="foi-drive:horizon=60"), (), (), ())
+    policy = LearnedDefender(Path("x"), {"attacks": "training", "scenario": "foi-drive:horizon=60"}, (), (), ())
     new = what_is_new(policy, make_scenario("foi-drive:horizon=40"), "strapdown", None)
     assert new == [
         "scenario foi-drive:horizon=40 (trained: foi-drive:horizon=60)", "fidelity strapdown (trained: linear)"
@@ -81,7 +81,7 @@ def test_a_defender_is_told_by_scenario_and_fidelity():
 
 
 def test_a_log_that_is_not_here_is_told_by_its_specification():
-    policy = LearnedSpoofer("x", SpooferConfig(scenario="recorded:/nowhere"), (), (), ())
+    policy = LearnedSpoofer(Path("x"), {"knowledge": "shadow", "scenario": "recorded:/nowhere"}, (), (), ())
     new = what_is_new(policy, make_scenario(SCENARIO), "linear", [make_detector("snapshot")])
     assert new == [f"scenario {SCENARIO} (trained: recorded:/nowhere)"]
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.learned import CONFIG_FILE, LearnedSpoofer
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
-from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.observation import spoofer_fields
+from spoofgym.envs.trained import spoofer_config
 from spoofgym.optimum import bounded_optimum
+from spoofgym.policies.learned import CONFIG_FILE, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import GRADES
 from train import evaluate, spoofer, wrong_shadow
@@ -32,8 +32,8 @@ def folder(tmp_path_factory):
     weight = np.zeros((3, len(layout)), dtype=np.float32)
     weight[[0, 1], [11, 12]] = 0.6
     bias = np.array([0.4, 0.3, 0.0], dtype=np.float32)
-    LearnedSpoofer("braking", SpooferConfig(scenario=SCENARIO), layout, (weight,), (bias,)).save(folder)
-    (folder / CONFIG_FILE).write_text(json.dumps({"environment": {"scenario": SCENARIO}}))
+    LearnedSpoofer(folder, {"knowledge": "shadow"}, layout, (weight,), (bias,)).save(folder)
+    (folder / CONFIG_FILE).write_text(json.dumps({"environment": {"knowledge": "shadow", "scenario": SCENARIO}}))
     return folder
 
 
@@ -89,9 +89,9 @@ def test_optimum_of_the_right_filter_is_the_best(evaluation):
 
 def test_a_blind_policy_keeps_its_configuration(folder):
     policy = LearnedSpoofer.load(folder)
-    blind = replace(policy, config=SpooferConfig(knowledge="blind"))
+    blind = replace(policy, configuration={"knowledge": "blind"})
     assert blind.with_shadow(WIDE) is blind
-    assert policy.with_shadow(WIDE).with_shadow(None).config == policy.config
+    assert spoofer_config(policy.with_shadow(WIDE).with_shadow(None)) == spoofer_config(policy)
 
 
 def test_paired_ratio_covers_the_truth():
@@ -138,7 +138,8 @@ def test_program(folder, tmp_path, capsys, monkeypatch):
 def test_a_policy_that_another_detector_has_taught_is_refused(folder, tmp_path, capsys, detector, told):
     other = tmp_path / "other"
     shutil.copytree(folder, other)
-    (other / CONFIG_FILE).write_text(json.dumps({"environment": {"scenario": SCENARIO, "detector": detector}}))
+    environment = {"knowledge": "shadow", "scenario": SCENARIO, "detector": detector}
+    (other / CONFIG_FILE).write_text(json.dumps({"environment": environment}))
     assert wrong_shadow.main(["--scenario", SCENARIO, "--attacker", str(other)]) == 2
     message = " ".join(capsys.readouterr().err.split())
     assert f"policy 'other' was trained against {told}" in message
@@ -157,7 +158,7 @@ def test_training_with_a_wrong_shadow_keeps_it(tmp_path):
     arguments = ["--scenario", SCENARIO, "--shadow", WIDE, "--steps", "5000", "--threads", "1", "--out", str(out)]
     assert spoofer.main(arguments) == 0
     assert json.loads((out / CONFIG_FILE).read_text())["environment"]["shadow"] == WIDE
-    assert LearnedSpoofer.load(out).config.shadow == WIDE
+    assert LearnedSpoofer.load(out).configuration["shadow"] == WIDE
 
 
 @pytest.mark.parametrize(

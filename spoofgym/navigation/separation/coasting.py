@@ -20,42 +20,41 @@ eqs 49 and 50; the common origin is ours.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
-from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.navigation.packed import packed_size
 from spoofgym.navigation.tight.model import TightModel
-from spoofgym.navigation.tight.states import INERTIAL, POSITION
+from spoofgym.navigation.tight.states import INERTIAL, NUM_INERTIAL, POSITION
 
 ORIGIN_LIFE = 600.0
 """Time after which the origin is moved on, s: about the time constant of a free vertical channel, in which C grows.
 It is never moved twice within the windows that are open at once."""
 
-PACKED = NUM_STATES * (NUM_STATES + 1) // 2
+PACKED = packed_size(NUM_INERTIAL)
 """Entries of the lower triangle of a covariance of the inertial states."""
 
 
-@dataclass(frozen=True)
-class CoastingTables(Immutable):
-    """What all windows of all runs share, by epoch; rows are the epochs 1 - n..K.
+class CoastingTables(NamedTuple):
+    """What all windows of all runs share, by epoch; rows are the epochs 1 - n..K. It is never changed.
 
     Attributes:
         num_windows: n, open at once.
-        origin_rows: B; the origin is moved on before each row that is a multiple of B, but the first.
+        origin_rows: B; the origin is moved on before each row that is a multiple of B, except the first.
         moved: C of the row before, about the origin before, for each such row; the first is the unit matrix, (R/B, 15,
             15).
-        spread: Γ, likewise; the first is zero.
+        spread: Γ of the same rows; the first is zero, (R/B, 15, 15).
         directions: places of the A directions u among east, north and up, (A,).
         inverse: C⁻¹, (R, 15, 15).
         projected: b = C' u, (R, A, 15).
         noise: Γ, (R, 15, 15).
         response: C⁻¹ U, (R, 15, m): what a whitened innovation does to E, less the sign; every range used.
-        variance: u' (P_coast - P_KF) u by the epochs since the window was opened, from 1 on, (R, A, n), m²; the same.
-        filtered: u' P_KF u after the ranges, (R, A), m²; the same.
+        variance: u' (P_coast - P_KF) u by the epochs since the window was opened, from 1 on, (R, A, n), m²; every range
+            used.
+        filtered: u' P_KF u after the ranges, (R, A), m²; every range used.
         early: M of the windows opened before epoch 0 less that of epoch -1, by the epochs since then at epoch 0, from 1
             on, packed, (120, n).
     """
@@ -73,6 +72,10 @@ class CoastingTables(Immutable):
     filtered: Floats
     early: Floats
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> CoastingTables:
+        """Itself: the copies of a detector share their tables."""
+        return self
+
 
 def coasting_tables(
     model: TightModel, directions: tuple[int, ...], num_windows: int, burn_in: int = 0
@@ -87,42 +90,51 @@ def coasting_tables(
     """
     places = np.array(directions, dtype=np.int64)
     rows = np.maximum(np.arange(1 - num_windows + burn_in, model.num_epochs + 1), 0)
+    origin_rows = max(num_windows, math.ceil(ORIGIN_LIFE / model.dynamics.interval))
+    moved, spread, inverse, projected, noise = _about_origins(model, rows, origin_rows, places)
+    gain = model.whitened_gain[:, :, INERTIAL]
+    response = inverse @ gain[rows].transpose(0, 2, 1)
+    variance = np.zeros((len(rows), len(places), num_windows))
+    _separation_variance(response, projected, origin_rows, moved, variance)
+    position_gain = gain[:, :, POSITION][:, :, places]
+    prior = model.covariance[:, POSITION, POSITION][:, places, places]
+    filtered = prior - np.add.reduce(position_gain**2, axis=1)
+    return CoastingTables(
+        num_windows=num_windows,
+        origin_rows=origin_rows,
+        moved=moved,
+        spread=spread,
+        directions=places,
+        inverse=inverse,
+        projected=projected,
+        noise=noise,
+        response=response,
+        variance=variance,
+        filtered=filtered[rows],
+        early=_early(response, num_windows),
+    )
+
+
+def _about_origins(
+    model: TightModel, rows: Runs, origin_rows: int, places: Runs
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """C and Γ at which the origin is moved on, then C⁻¹, C' u and Γ of all rows."""
+    n = model.separation_transition.shape[1]
     transition, process_noise = model.separation_transition, model.separation_noise
     backward = np.linalg.inv(transition)
-    inverse, noise = np.empty((len(rows), NUM_STATES, NUM_STATES)), np.empty((len(rows), NUM_STATES, NUM_STATES))
-    projected = np.empty((len(rows), len(places), NUM_STATES))
-    carried, undone, spread = np.eye(NUM_STATES), np.eye(NUM_STATES), np.zeros((NUM_STATES, NUM_STATES))
-    origin_rows = max(num_windows, math.ceil(ORIGIN_LIFE / model.dynamics.interval))
+    inverse, noise = np.empty((len(rows), n, n)), np.empty((len(rows), n, n))
+    projected = np.empty((len(rows), len(places), n))
+    carried, undone, spread = np.eye(n), np.eye(n), np.zeros((n, n))
     moved, spreads = [], []
     for r, k in enumerate(rows):
         if r % origin_rows == 0:
             moved.append(carried)
             spreads.append(spread)
-            carried, undone, spread = np.eye(NUM_STATES), np.eye(NUM_STATES), np.zeros((NUM_STATES, NUM_STATES))
+            carried, undone, spread = np.eye(n), np.eye(n), np.zeros((n, n))
         carried, undone = transition[k] @ carried, undone @ backward[k]
         spread = transition[k] @ spread @ transition[k].T + process_noise[k]
         inverse[r], projected[r], noise[r] = undone, carried[POSITION][places], spread
-    gain = model.whitened_gain[:, :, INERTIAL]
-    response = inverse @ gain[rows].transpose(0, 2, 1)
-    variance = np.zeros((len(rows), len(places), num_windows))
-    _separation_variance(response, projected, origin_rows, np.array(moved), variance)
-    position_gain = gain[:, :, POSITION][:, :, places]
-    prior = model.covariance[:, POSITION, POSITION][:, places, places]
-    filtered = prior - np.add.reduce(position_gain**2, axis=1)
-    return CoastingTables(
-        num_windows,
-        origin_rows,
-        np.array(moved),
-        np.array(spreads),
-        places,
-        inverse,
-        projected,
-        noise,
-        response,
-        variance,
-        filtered[rows],
-        _early(response, num_windows),
-    )
+    return np.array(moved), np.array(spreads), inverse, projected, noise
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -131,7 +143,7 @@ def _separation_variance(
 ) -> None:
     """Σ |U_i' C_i⁻ᵀ b_k|² over the epochs i since a window was opened; variance (R, A, n), overwritten."""
     rows, axes, windows = variance.shape
-    direction, before = np.empty(NUM_STATES), np.empty(NUM_STATES)
+    direction, before = np.empty(NUM_INERTIAL), np.empty(NUM_INERTIAL)
     for k in range(rows):
         for a in range(axes):
             total = 0.0
@@ -139,22 +151,23 @@ def _separation_variance(
             for age in range(min(windows, k + 1)):
                 for c in range(response.shape[2]):
                     part = 0.0
-                    for i in range(NUM_STATES):
+                    for i in range(NUM_INERTIAL):
                         part += response[k - age, i, c] * direction[i]
                     total += part * part
                 variance[k, a, age] = total
                 if (k - age) % origin_rows == 0:
                     # the epochs before have the origin before: C' b
                     before[:] = 0.0
-                    for i in range(NUM_STATES):
-                        for j in range(NUM_STATES):
+                    for i in range(NUM_INERTIAL):
+                        for j in range(NUM_INERTIAL):
                             before[j] += moved[(k - age) // origin_rows, i, j] * direction[i]
                     direction[:] = before
 
 
 def _early(response: Floats, num_windows: int) -> Floats:
-    early = np.zeros((PACKED, num_windows))
-    lower = np.tril_indices(NUM_STATES)
+    """M of the windows opened before epoch 0, as in `CoastingTables`."""
+    lower = np.tril_indices(response.shape[1])
+    early = np.zeros((len(lower[0]), num_windows))
     for age in range(1, num_windows):
         gain = response[num_windows - 1 - age]
         early[:, age] = early[:, age - 1] + (gain @ gain.T)[lower]

@@ -9,26 +9,28 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
-from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.navigation.packed import unpack
 from spoofgym.navigation.separation.coasting import PACKED
+from spoofgym.navigation.tight.states import NUM_INERTIAL
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bring_back(covariance: Floats, noise: Floats, inverse: Floats, work: Floats, packed: Floats) -> None:
-    """C⁻¹ (P - Γ) C⁻ᵀ, its lower triangle by rows, (120,); the others (15, 15)."""
-    for i in range(NUM_STATES):
-        for j in range(NUM_STATES):
+def bring_back(covariance: Floats, noise: Floats, inverse: Floats, packed: Floats) -> None:
+    """C⁻¹ (P - Γ) C⁻ᵀ, packed, (120,), overwritten; covariance P, noise Γ and inverse C⁻¹ (15, 15)."""
+    work = np.empty((NUM_INERTIAL, NUM_INERTIAL))
+    for i in range(NUM_INERTIAL):
+        for j in range(NUM_INERTIAL):
             work[i, j] = 0.0
-        for c in range(NUM_STATES):
+        for c in range(NUM_INERTIAL):
             factor = inverse[i, c]
             if factor != 0.0:
-                for j in range(NUM_STATES):
+                for j in range(NUM_INERTIAL):
                     work[i, j] += factor * (covariance[c, j] - noise[c, j])
     place = 0
-    for i in range(NUM_STATES):
+    for i in range(NUM_INERTIAL):
         for j in range(i + 1):
             total = 0.0
-            for c in range(NUM_STATES):
+            for c in range(NUM_INERTIAL):
                 total += work[i, c] * inverse[j, c]
             packed[place] = total
             place += 1
@@ -37,24 +39,19 @@ def bring_back(covariance: Floats, noise: Floats, inverse: Floats, work: Floats,
 @njit(cache=True, nogil=True, error_model="numpy")
 def move_covariances(moved: Floats, spread: Floats, excess: Floats) -> None:
     """M <- C M C' + Γ of all slots, packed (120, n), in place; moved C and spread Γ (15, 15)."""
-    covariance, work = np.empty((NUM_STATES, NUM_STATES)), np.empty((NUM_STATES, NUM_STATES))
+    covariance, work = np.empty((NUM_INERTIAL, NUM_INERTIAL)), np.empty((NUM_INERTIAL, NUM_INERTIAL))
     for s in range(excess.shape[1]):
-        place = 0
-        for i in range(NUM_STATES):
-            for j in range(i + 1):
-                covariance[i, j] = excess[place, s]
-                covariance[j, i] = covariance[i, j]
-                place += 1
+        unpack(excess[:, s], covariance)
         work[:] = 0.0
-        for i in range(NUM_STATES):
-            for c in range(NUM_STATES):
-                for j in range(NUM_STATES):
+        for i in range(NUM_INERTIAL):
+            for c in range(NUM_INERTIAL):
+                for j in range(NUM_INERTIAL):
                     work[i, j] += moved[i, c] * covariance[c, j]
         place = 0
-        for i in range(NUM_STATES):
+        for i in range(NUM_INERTIAL):
             for j in range(i + 1):
                 total = spread[i, j]
-                for c in range(NUM_STATES):
+                for c in range(NUM_INERTIAL):
                     total += work[i, c] * moved[j, c]
                 excess[place, s] = total
                 place += 1
@@ -85,7 +82,7 @@ def take_back(
         if first <= known[slot - age] < known[slot]:
             known[slot - age] = known[source]
             alarmed[slot - age] = alarmed[source]
-            for i in range(NUM_STATES):
+            for i in range(NUM_INERTIAL):
                 departure[i, slot - age] = departure[i, source]
             for p in range(PACKED):
                 excess[p, slot - age] = excess[p, source]
@@ -95,7 +92,7 @@ def take_back(
 def quadratic_forms(direction: Floats, excess: Floats, slot: int, weight: Floats, variance: Floats) -> None:
     """b' (M_j - M_k) b of all slots j, (n,), of which k is one; direction b (15,), excess (120, n), weight (120,)."""
     place = 0
-    for i in range(NUM_STATES):
+    for i in range(NUM_INERTIAL):
         for j in range(i + 1):
             weight[place] = direction[i] * direction[j] * (1.0 if i == j else 2.0)
             place += 1

@@ -9,6 +9,7 @@ from spoofgym.kernels import njit
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
+from spoofgym.navigation.packed import pack, packed_size, unpack
 from spoofgym.navigation.position_domain import project_onto_position
 from spoofgym.navigation.tight import kalman as tight_filter
 from spoofgym.navigation.tight.model import TightModel
@@ -48,7 +49,7 @@ class TightOwnNavigator(TightNavigator):
         self._response = np.zeros((num_runs, m, 3))
         self._deviation = np.zeros((num_runs, m))
         self._past_state = np.zeros((num_runs, slots, n))
-        self._past_covariance = np.zeros((num_runs, slots, n * (n + 1) // 2))
+        self._past_covariance = np.zeros((num_runs, slots, packed_size(n)))
         self._ones = np.ones(num_runs)
         self._every_satellite = np.ones((num_runs, model.dynamics.num_slots), dtype=bool)
 
@@ -214,27 +215,6 @@ class TightOwnNavigator(TightNavigator):
         slots = self._past_state.shape[1]
         track = self._past_state[self._all[:, None], (order + 1) % max(slots, 1)][:, :, POSITION]
         return np.where(order[:, :, None] >= 0, track, 0.0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def pack(covariance: Floats, packed: Floats) -> None:
-    """The lower triangle by rows; covariance (n, n), packed (n (n + 1) / 2,)."""
-    place = 0
-    for i in range(covariance.shape[0]):
-        for j in range(i + 1):
-            packed[place] = covariance[i, j]
-            place += 1
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def unpack(packed: Floats, covariance: Floats) -> None:
-    """The inverse of `pack`."""
-    place = 0
-    for i in range(covariance.shape[0]):
-        for j in range(i + 1):
-            covariance[i, j] = packed[place]
-            covariance[j, i] = packed[place]
-            place += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -27,7 +27,9 @@ from spoofgym.arrays import Floats
 from spoofgym.sensors.geometry import SatelliteGeometry
 from spoofgym.sensors.ranging import obliquity, troposphere_mapping
 
-INERTIAL = slice(0, 15)
+NUM_INERTIAL = 15
+"""States of the loosely coupled filter, which come first."""
+INERTIAL = slice(0, NUM_INERTIAL)
 NAVIGATION = slice(0, 9)
 VELOCITY = slice(3, 6)
 POSITION = slice(6, 9)

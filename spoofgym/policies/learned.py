@@ -1,7 +1,7 @@
-"""Learned players: small networks in NumPy, so that a policy can be used without torch and without a pickle.
+"""Learned policies: small networks in NumPy. Using one needs neither torch nor a pickle.
 
-A run folder may come from a stranger: it is arrays and text, read within limits, and whatever is wrong with a file is
-told in one line that names it.
+A run folder may come from a stranger. It is arrays and text, both are read within limits, and a damaged file is
+reported in one line that names it.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,23 +20,20 @@ from typing_extensions import Self
 
 from spoofgym import files
 from spoofgym.archive import read_arrays
-from spoofgym.envs.config import DefenderConfig, SpooferConfig, configure
-from spoofgym.envs.observation import Field
-from spoofgym.envs.range_features import SLOT_FIELD
 
 POLICY_FILE = "policy.npz"
 CONFIG_FILE = "config.json"
 LARGEST_CONFIG = 2**20
-"""Bytes of a ``config.json``; a real one has about a thousand."""
-PLAYERS: dict[type, tuple[str, str]] = {
-    SpooferConfig: ("a spoofer", "knowledge"),
-    DefenderConfig: ("a defender", "attacks"),
-}
-"""Who is trained on an environment, and an argument that no other environment has."""
+"""Largest ``config.json`` that is read, bytes; a real one has about a thousand."""
+SPOOFER, DEFENDER = "spoofer", "defender"
+TOLD_BY = {SPOOFER: "knowledge", DEFENDER: "attacks"}
+"""The argument of an environment that tells whose it is: no other environment has it."""
+SLOT_FIELD = "satellite in slot"
+"""How the names of the entries begin that tell which slots hold a satellite."""
 
 
 def read_config(folder: Path) -> dict[str, Any]:
-    """What ``config.json`` of a run folder says.
+    """Read ``config.json`` of a run folder.
 
     Raises:
         ValueError: it is damaged.
@@ -51,34 +48,16 @@ def read_config(folder: Path) -> dict[str, Any]:
         return content
 
 
-def environment_of(kind: type, content: Mapping[str, Any], path: Path) -> Any:
-    """The environment that a configuration file names, a ``kind``.
+def kind_of(configuration: Mapping[str, Any]) -> str:
+    """Who was trained on an environment of this configuration: ``SPOOFER`` or ``DEFENDER``.
 
     Raises:
-        ValueError: the run trains another player, or an argument is unknown or of another type.
+        ValueError: the configuration does not tell.
     """
-    arguments = content["environment"]
-    for other, (player, argument) in PLAYERS.items():
-        if other is not kind and argument in arguments and PLAYERS[kind][1] not in arguments:
-            raise ValueError(f"{path.parent} is the run folder of {player}, not of {PLAYERS[kind][0]}")
-    with files.reading(path):
-        for name, value in arguments.items():
-            _check_specification(name, value)
-        return configure(kind, arguments)
-
-
-def _check_specification(name: str, value: object) -> None:
-    """A part of a run is named by its specification, or several by a list of them."""
-    if name in ("detector", "detectors", "attacks") and isinstance(value, list):
-        right = bool(value) and all(isinstance(item, str) for item in value)
-    elif name in ("scenario", "detector", "detectors", "attacks", "response", "fidelity"):
-        right = isinstance(value, str)
-    elif name == "shadow":
-        right = value is None or isinstance(value, str)
-    else:
-        return
-    if not right:
-        raise ValueError(f"{name} must be named by a specification, got {value!r}")
+    for kind, argument in TOLD_BY.items():
+        if argument in configuration:
+            return kind
+    raise ValueError(f"its environment has none of the arguments {', '.join(TOLD_BY.values())}: who plays is unknown")
 
 
 @dataclass(frozen=True)
@@ -86,20 +65,26 @@ class LearnedPolicy:
     """A tanh network and what it was trained on.
 
     Attributes:
-        name: its run folder's name.
-        config: the environment it was trained on, a ``config_type``.
-        layout: the entries of the observation it was trained on, by name.
+        kind: who plays, ``SPOOFER`` or ``DEFENDER``.
+        folder: of the run or of the published agent; its name is the name of the policy.
+        configuration: arguments of the environment that it was trained on, as plain values.
+        layout: names of the entries of the observation that it was trained on, in order.
         weights: of each layer, (outputs, inputs).
         biases: of each layer, (outputs,).
     """
 
-    config_type: ClassVar[type]
+    kind: ClassVar[str]
 
-    name: str
-    config: Any
+    folder: Path
+    configuration: Mapping[str, Any]
     layout: tuple[str, ...]
     weights: tuple[NDArray[np.float32], ...]
     biases: tuple[NDArray[np.float32], ...]
+
+    @property
+    def name(self) -> str:
+        """The name of its folder."""
+        return self.folder.resolve().name
 
     def outputs(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """What the last layer gives for observations (N, D)."""
@@ -108,13 +93,16 @@ class LearnedPolicy:
             hidden = np.tanh(hidden @ weight.T + bias)
         return hidden @ self.weights[-1].T + self.biases[-1]
 
-    def check_layout(self, fields: tuple[Field, ...]) -> None:
-        """Refuse an environment whose observation has other entries.
+    def check_layout(self, layout: Sequence[str]) -> None:
+        """Refuse an observation that has other entries than the policy was trained on.
+
+        Args:
+            layout: names of the entries, in order.
 
         Raises:
             ValueError: naming the first entry that differs.
         """
-        present = tuple(field.name for field in fields)
+        present = tuple(layout)
         if present == self.layout:
             return
         pairs = zip((*self.layout, *[None] * len(present)), (*present, *[None] * len(self.layout)), strict=False)
@@ -151,16 +139,17 @@ class LearnedPolicy:
 
         Raises:
             FileNotFoundError: it holds no policy.
-            ValueError: a file is damaged, or the policy is of another player.
+            ValueError: a file is damaged, or the policy plays the other side.
         """
-        for name in (POLICY_FILE, CONFIG_FILE):
-            if not (folder / name).is_file():
-                raise FileNotFoundError(f"{folder} is no run folder: it has no {name}")
-        config = environment_of(cls.config_type, read_config(folder), folder / CONFIG_FILE)
+        configuration = _configuration(folder)
+        with files.reading(folder / CONFIG_FILE):
+            kind = kind_of(configuration)
+        if kind != cls.kind:
+            raise ValueError(f"{folder} is the run folder of a {kind}, not of a {cls.kind}")
         path = folder / POLICY_FILE
         arrays = read_arrays(path)
         with files.reading(path):
-            policy = cls(folder.resolve().name, config, *_network(arrays))
+            policy = cls(folder, configuration, *_network(arrays))
             policy.check_outputs()
         return policy
 
@@ -171,6 +160,20 @@ class LearnedPolicy:
             ValueError: naming the number of its outputs.
         """
         raise NotImplementedError
+
+
+def _configuration(folder: Path) -> dict[str, Any]:
+    """The arguments of the environment of a run folder that holds a policy.
+
+    Raises:
+        FileNotFoundError: it holds no policy.
+        ValueError: ``config.json`` is damaged.
+    """
+    for name in (POLICY_FILE, CONFIG_FILE):
+        if not (folder / name).is_file():
+            raise FileNotFoundError(f"{folder} is no run folder: it has no {name}")
+    environment: dict[str, Any] = read_config(folder)["environment"]
+    return environment
 
 
 def _network(arrays: Mapping[str, NDArray[Any]]) -> tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]:
@@ -201,7 +204,7 @@ def _network(arrays: Mapping[str, NDArray[Any]]) -> tuple[tuple[str, ...], tuple
 class LearnedSpoofer(LearnedPolicy):
     """A spoofer that plays the mean action of its network."""
 
-    config_type = SpooferConfig
+    kind = SPOOFER
 
     def check_outputs(self) -> None:
         """Refuse a network that gives neither three nor four rates.
@@ -213,10 +216,10 @@ class LearnedSpoofer(LearnedPolicy):
             raise ValueError(f"a spoofer's network has 3 or 4 outputs, this one {len(self.biases[-1])}")
 
     def with_shadow(self, shadow: str | None) -> Self:
-        """The same policy with a shadow filter of another scenario (None: the victim's own); a blind one has none."""
-        if self.config.knowledge == "blind":
+        """This policy with a shadow filter of another scenario (None: the victim's own); a blind one has none."""
+        if self.configuration.get(TOLD_BY[SPOOFER]) == "blind":
             return self
-        return replace(self, config=replace(self.config, shadow=shadow))
+        return replace(self, configuration={**self.configuration, "shadow": shadow})
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions in [-1, 1] for observations (N, D), (N, 3), or (N, 4) where the filter takes ranges."""
@@ -230,7 +233,7 @@ class LearnedDefender(LearnedPolicy):
     slot.
     """
 
-    config_type = DefenderConfig
+    kind = DEFENDER
 
     def check_outputs(self) -> None:
         """Refuse a network that has no depth to choose.
@@ -256,3 +259,16 @@ class LearnedDefender(LearnedPolicy):
         ends = np.cumsum([2, self.depths, *[2] * self.slots])[:-1]
         parts = np.split(self.outputs(observation), ends, axis=1)
         return np.stack([part.argmax(axis=1) for part in parts], axis=1)
+
+
+def load_policy(folder: Path) -> LearnedSpoofer | LearnedDefender:
+    """Read a run folder, whoever plays.
+
+    Raises:
+        FileNotFoundError: it holds no policy.
+        ValueError: a file is damaged, or does not tell who plays.
+    """
+    configuration = _configuration(folder)
+    with files.reading(folder / CONFIG_FILE):
+        kind = kind_of(configuration)
+    return LearnedSpoofer.load(folder) if kind == SPOOFER else LearnedDefender.load(folder)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from agents.scripted import OffsetSequence
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.optimum import LinearTest, bounded_optimum, cumulative_optimum, ewma, gate, window_mean, zero_alarm
+from spoofgym.policies.scripted import OffsetSequence
 from spoofgym.scenario import Scenario
 from spoofgym.specification import write
 

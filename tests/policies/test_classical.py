@@ -2,8 +2,9 @@
 
 import pytest
 
-from agents import defenders
-from agents.defenders import (
+from spoofgym.detectors import make_detector
+from spoofgym.policies import classical as defenders
+from spoofgym.policies.classical import (
     GRID_DEPTHS,
     GRID_DETECTORS,
     GRID_REUSES,
@@ -17,7 +18,6 @@ from agents.defenders import (
     tuned_for,
     with_depth,
 )
-from spoofgym.detectors import make_detector
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.scripted import OffsetSequence, RandomRates
 from spoofgym.arrays import Floats
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot
-from spoofgym.evaluation.metrics import undetected_error
-from spoofgym.evaluation.monte_carlo import Episodes
 from spoofgym.optimum import best_budget, best_ramp, bounded_optimum, noncentrality_optimum, upper_bound
+from spoofgym.policies.scripted import OffsetSequence, RandomRates
 from spoofgym.scenario import Scenario
 
-Play = Callable[[Attack, int], Episodes]
+Score = Callable[[Attack, int], float]
+"""The mean undetected error, m, of an attack over so many games, which are always played with the same noise."""
 
 SEARCH_EPISODES = 1000
 SEARCH_ROUNDS = 3
@@ -64,14 +63,14 @@ def known_baselines(scenario: Scenario, threshold: float) -> list[Baseline]:
     ]
 
 
-def searched_baselines(scenario: Scenario, play: Play) -> list[Baseline]:
+def searched_baselines(scenario: Scenario, score: Score) -> list[Baseline]:
     """The baselines of a game without exact values: ramp and closed form are searched by simulation.
 
     Args:
         scenario: of the game.
-        play: plays an attack for so many episodes, always with the same noise.
+        score: of an attack in the game, by simulation.
     """
-    rate, azimuth = _search_ramp(scenario, play)
+    rate, azimuth = _search_ramp(scenario, score)
     baselines = [
         Baseline("none", "blind", make_attack("none"), None),
         Baseline("random", "blind", RandomRates(scenario.drag_off_rate), None),
@@ -79,7 +78,7 @@ def searched_baselines(scenario: Scenario, play: Play) -> list[Baseline]:
     ]
     if scenario.dimension == 3:
         unit = noncentrality_optimum(scenario.linear_model(), scenario.timeline.num_epochs, 1.0).offsets
-        scale = _search_scale(lambda factor: OffsetSequence("closed-form", factor * unit), play)
+        scale = _search_scale(lambda factor: OffsetSequence("closed-form", factor * unit), score)
         baselines.append(Baseline("closed-form", "shadow", OffsetSequence("closed-form", scale * unit), None))
     else:
         baselines.append(Baseline("closed-form", "shadow", None, None))
@@ -90,17 +89,17 @@ def _ramp(rate: float, azimuth: float) -> Attack:
     return make_attack(f"ramp:{rate:.6g},direction={azimuth:.6g}")
 
 
-def _score(attack: Attack, play: Play) -> float:
-    return float(np.mean(undetected_error(play(attack, SEARCH_EPISODES))))
-
-
-def _search_ramp(scenario: Scenario, play: Play) -> tuple[float, float]:
+def _search_ramp(scenario: Scenario, score: Score) -> tuple[float, float]:
     """Best rate (m/s) and azimuth (degrees) on a grid that is refined about its best point."""
     rates: Floats = np.geomspace(0.01, max(scenario.drag_off_rate[:2]), 9)
     azimuths: Floats = np.arange(0.0, 180.0, 45.0)
     best = (-1.0, 0.0, 0.0)
     for _ in range(SEARCH_ROUNDS):
-        scores = [(_score(_ramp(rate, azimuth % 180.0), play), rate, azimuth) for rate in rates for azimuth in azimuths]
+        scores = [
+            (score(_ramp(rate, azimuth % 180.0), SEARCH_EPISODES), rate, azimuth)
+            for rate in rates
+            for azimuth in azimuths
+        ]
         best = max([best, *scores])
         ratio = (rates[-1] / rates[0]) ** (1.0 / (len(rates) - 1))
         spacing = azimuths[1] - azimuths[0]
@@ -110,12 +109,12 @@ def _search_ramp(scenario: Scenario, play: Play) -> tuple[float, float]:
     return float(best[1]), float(best[2] % 180.0)
 
 
-def _search_scale(attack_at: Callable[[float], Attack], play: Play) -> float:
+def _search_scale(attack_at: Callable[[float], Attack], score: Score) -> float:
     """Best factor on a grid that is refined about its best point."""
     factors: Floats = np.geomspace(0.5, 100.0, 12)
     best = (-1.0, 0.0)
     for _ in range(SEARCH_ROUNDS):
-        best = max([best, *((_score(attack_at(factor), play), factor) for factor in factors)])
+        best = max([best, *((score(attack_at(factor), SEARCH_EPISODES), factor) for factor in factors)])
         ratio = (factors[-1] / factors[0]) ** (1.0 / (len(factors) - 1))
         factors = best[1] * np.geomspace(1.0 / ratio, ratio, 5)
     return float(best[1])

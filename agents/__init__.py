@@ -1,1 +1,0 @@
-"""Policies that play: learned and scripted."""

@@ -1,0 +1,59 @@
+"""Finds published agents by name: a folder of the package each, with policy, configuration, card and recipe.
+
+An installed package holds them in ``spoofgym/agents``, a checkout in ``agents`` beside the package.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import spoofgym
+from spoofgym.policies.learned import POLICY_FILE
+
+AGENTS = "agents"
+
+
+def agents_folder() -> Path:
+    """The folder of the published agents."""
+    package = Path(spoofgym.__file__).parent
+    installed = package / AGENTS
+    return installed if installed.is_dir() else package.parent / AGENTS
+
+
+def published_names() -> list[str]:
+    """The names of the published agents, sorted."""
+    return sorted(path.parent.name for path in agents_folder().glob(f"*/{POLICY_FILE}"))
+
+
+def published_folder(name: str) -> Path:
+    """The folder of a published agent.
+
+    Raises:
+        ValueError: there is none of this name; the message lists the valid ones.
+    """
+    names = published_names()
+    if name not in names:
+        raise ValueError(f"no published agent is named {name!r}; {_listed(names)}")
+    return agents_folder() / name
+
+
+def policy_folder(text: str) -> Path:
+    """The folder of a policy that is given by the name of a published agent or by the path of a run folder.
+
+    The name of a published agent stands for this agent, even where a folder of this name lies in the working directory.
+
+    Raises:
+        ValueError: neither; the message lists the valid names.
+    """
+    names = published_names()
+    if text in names:
+        return agents_folder() / text
+    if not Path(text).is_dir():
+        kind = "run folder" if os.sep in text else "published agent and no run folder"
+        raise ValueError(f"{text!r} is no {kind}; {_listed(names)}")
+    return Path(text)
+
+
+def _listed(names: list[str]) -> str:
+    return f"published agents: {', '.join(names)}" if names else "this version publishes no agents"

@@ -1,0 +1,1 @@
+"""Programs that print the tables of one paper or of one page."""

@@ -1,0 +1,53 @@
+"""Published agents are found by name, in an installed package and in a checkout."""
+
+import pytest
+
+from spoofgym.policies import published
+from spoofgym.policies.learned import POLICY_FILE
+from spoofgym.policies.published import agents_folder, policy_folder, published_folder, published_names
+
+
+@pytest.fixture(params=["agents", "spoofgym/agents"], ids=["checkout", "wheel"])
+def agents(request, tmp_path, monkeypatch):
+    """A folder of agents where a checkout, or an installed package, has it."""
+    (tmp_path / "spoofgym").mkdir()
+    monkeypatch.setattr(published.spoofgym, "__file__", str(tmp_path / "spoofgym" / "__init__.py"))
+    folder = tmp_path / request.param
+    for name in ("b", "a"):
+        (folder / name).mkdir(parents=True)
+        (folder / name / POLICY_FILE).touch()
+    (folder / "README.md").touch()
+    (folder / "draft").mkdir()
+    return folder
+
+
+def test_agents_have_names(agents):
+    assert agents_folder() == agents
+    assert published_names() == ["a", "b"]
+    assert published_folder("a") == policy_folder("a") == agents / "a"
+
+
+def test_another_name_is_refused_with_the_valid_ones(agents):
+    for find in (published_folder, policy_folder):
+        with pytest.raises(ValueError, match=r"'draft'.*; published agents: a, b$"):
+            find("draft")
+
+
+def test_a_path_is_a_run_folder(agents, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "x").mkdir(parents=True)
+    assert policy_folder("runs/x").resolve() == tmp_path / "runs" / "x"
+    with pytest.raises(ValueError, match=r"^'runs/y' is no run folder; published agents: a, b$"):
+        policy_folder("runs/y")
+
+
+def test_a_published_name_is_no_folder_of_the_working_directory(agents, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a").mkdir()
+    assert policy_folder("a") == agents / "a"
+
+
+def test_this_version_publishes_no_agents():
+    assert agents_folder().name == "agents"
+    with pytest.raises(ValueError, match="this version publishes no agents"):
+        published_folder("x")
