@@ -157,5 +157,5 @@ def offsets_without_chance(game: SpooferGame, act: Callable[[Any], Any]) -> Floa
     offsets = []
     for _ in range(game.scenario.timeline.num_epochs):
         game.step(act(game.observation()))
-        offsets.append(game.offset[0].copy())
+        offsets.append(game.seat.offset[0].copy())
     return np.array(offsets)

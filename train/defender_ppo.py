@@ -23,7 +23,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 from torch import nn
 
 from spoofgym.envs.config import DefenderConfig
-from spoofgym.envs.defender_game import EXCLUDE
+from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv
 from spoofgym.policies.learned import SLOT_FIELD, LearnedDefender

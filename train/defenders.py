@@ -94,9 +94,9 @@ def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
         config = replace(defender_config(policy), scenario=world.scenario, fidelity=world.fidelity)
         game = DefenderGame(config, 1, world.detectors)
         policy.check_layout([field.name for field in game.fields])
-        if policy.depths != len(game.depths):
+        if policy.depths != len(game.seat.depths):
             raise ValueError(
-                f"policy {policy.name!r} was trained on {policy.depths} depths, the game has {len(game.depths)}"
+                f"policy {policy.name!r} was trained on {policy.depths} depths, the game has {len(game.seat.depths)}"
             )
 
 

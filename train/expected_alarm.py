@@ -74,7 +74,7 @@ class ExpectedAlarmVectorEnv(SpooferVectorEnv):
 
     def _play(self, actions: NDArray[np.float32], restarting: Runs | None) -> tuple[Any, Flags]:
         outcome, truncated = super()._play(actions, restarting)
-        shadow = self.game.shadow
+        shadow = self.game.seat.shadow
         assert shadow is not None
         magnitude = np.sqrt(np.sum(shadow.whitened**2, axis=1))
         survival = self._survival * np.exp(log_survival(magnitude, shadow.whitened.shape[1], self._threshold))

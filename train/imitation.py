@@ -47,21 +47,21 @@ class Teacher:
 
     def act(self, game: DefenderGame) -> NDArray[np.int64]:
         """What it does in the present epoch, (N, 2 + S); it leaves no single satellite out."""
-        features = game.features
+        features = game.seat.features
         if self.depth is None:
-            place = np.searchsorted(game.depths, features.onset_depth + DEFAULT_MARGIN)
-            place = np.minimum(place, len(game.depths) - 1)
+            place = np.searchsorted(game.seat.depths, features.onset_depth + DEFAULT_MARGIN)
+            place = np.minimum(place, len(game.seat.depths) - 1)
         else:
             place = np.full(game.num_lanes, self.depth)
-        exclude = features.suspicion | (game.excluding & (features.agreeing < self.reuse))
-        action = np.zeros((game.num_lanes, len(game.action_space.nvec)), dtype=np.int64)
+        exclude = features.suspicion | (game.seat.excluding & (features.agreeing < self.reuse))
+        action = np.zeros((game.num_lanes, len(game.seat.space.nvec)), dtype=np.int64)
         action[:, 0], action[:, 1] = exclude, place
         return action
 
 
 def best_teacher(vector: DefenderVectorEnv, seed: int) -> Teacher:
     """The one whose error is least on common games: all are tried on a few, the best quarter on many."""
-    teachers = [Teacher(depth, reuse) for depth in (None, *range(len(vector.game.depths))) for reuse in REUSES]
+    teachers = [Teacher(depth, reuse) for depth in (None, *range(len(vector.game.seat.depths))) for reuse in REUSES]
     tried = sorted(teachers, key=lambda teacher: total_error(vector, teacher, FEW, seed))
     return min(tried[: -(-len(tried) // 4)], key=lambda teacher: total_error(vector, teacher, MANY, seed))
 

@@ -8,6 +8,7 @@ that it began with, so that every number that leaves the navigator stays finite,
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,19 +39,42 @@ def diverged_error(run: int, time: float) -> FilterDivergedError:
     )
 
 
+class Solution(NamedTuple):
+    """Inertial solutions of N runs, or, without the leading axis, of one run.
+
+    Attributes:
+        attitude: C, body to ENU, (N, 3, 3).
+        velocity: ENU, (N, 3), m/s.
+        position: latitude rad, longitude rad, height m, (N, 3).
+        bias: estimated gyro and accelerometer biases, (N, 6), rad/s and m/s².
+    """
+
+    attitude: Floats
+    velocity: Floats
+    position: Floats
+    bias: Floats
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def valid(attitude: Floats, velocity: Floats, position: Floats, bias: Floats, covariance: Floats) -> bool:
-    """Whether the solution of one run can be carried on; shapes (3, 3), (3,), (3,), (6,), (n, n)."""
+def solution_of(run: int, solution: Solution) -> Solution:
+    """The solution of one run: views of the arrays of all runs."""
+    return Solution(solution.attitude[run], solution.velocity[run], solution.position[run], solution.bias[run])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def valid(solution: Solution, covariance: Floats) -> bool:
+    """Whether the solution of one run can be carried on; covariance P, (n, n)."""
     total = 0.0
     for i in range(3):
         for j in range(3):
-            total += attitude[i, j]
+            total += solution.attitude[i, j]
     for i in range(6):
-        total += bias[i]
+        total += solution.bias[i]
     for i in range(len(covariance)):
         if not covariance[i, i] >= 0.0:
             return False
         total += covariance[i, i]
+    velocity, position = solution.velocity, solution.position
     fast = max(abs(velocity[0]), max(abs(velocity[1]), abs(velocity[2])))
     return (
         math.isfinite(total)
@@ -64,10 +88,7 @@ def valid(attitude: Floats, velocity: Floats, position: Floats, bias: Floats, co
 @njit(cache=True, nogil=True, error_model="numpy")
 def hold(
     runs: Runs,
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
-    bias: Floats,
+    solution: Solution,
     covariance: Floats,
     auxiliary: Floats,
     prior_covariance: Floats,
@@ -78,10 +99,7 @@ def hold(
 
     Args:
         runs: which, (n,).
-        attitude: of all runs, (N, 3, 3), in place.
-        velocity: (N, 3), m/s, in place.
-        position: (N, 3), latitude rad, longitude rad, height m, in place.
-        bias: (N, 6), in place.
+        solution: of all runs, in place.
         covariance: P, (N, n, n), in place.
         auxiliary: the unaided solution minus the filter's, (N, 15) or (N, 0), in place; zero in a diverged run.
         prior_covariance: that of a diverged run, (n, n).
@@ -89,24 +107,24 @@ def hold(
         diverged: whether each run has ever diverged in its episode, (N,), in place.
     """
     for run in runs:
+        own, kept = solution_of(run, solution), held[run]
         if not diverged[run]:
-            diverged[run] = not valid(attitude[run], velocity[run], position[run], bias[run], covariance[run])
-        solution = held[run]
+            diverged[run] = not valid(own, covariance[run])
         if diverged[run]:
             covariance[run], auxiliary[run] = prior_covariance, 0.0
             for i in range(9):
-                attitude[run, i // 3, i % 3] = solution[i]
+                own.attitude[i // 3, i % 3] = kept[i]
             for i in range(3):
-                velocity[run, i], position[run, i] = solution[9 + i], solution[12 + i]
+                own.velocity[i], own.position[i] = kept[9 + i], kept[12 + i]
             for i in range(6):
-                bias[run, i] = solution[15 + i]
+                own.bias[i] = kept[15 + i]
         else:
             for i in range(9):
-                solution[i] = attitude[run, i // 3, i % 3]
+                kept[i] = own.attitude[i // 3, i % 3]
             for i in range(3):
-                solution[9 + i], solution[12 + i] = velocity[run, i], position[run, i]
+                kept[9 + i], kept[12 + i] = own.velocity[i], own.position[i]
             for i in range(6):
-                solution[15 + i] = bias[run, i]
+                kept[15 + i] = own.bias[i]
 
 
 def blank(places: Runs, residual: Floats, covariance: Floats, whitened: Floats, nis: Floats) -> None:

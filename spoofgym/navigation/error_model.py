@@ -21,6 +21,10 @@ from spoofgym.kernels import njit
 
 NUM_NAVIGATION = 9
 NUM_STATES = 15
+INERTIAL = slice(0, NUM_STATES)
+VELOCITY = slice(3, 6)
+POSITION = slice(6, 9)
+BIAS = slice(NUM_NAVIGATION, NUM_STATES)
 
 
 @njit(cache=True, nogil=True)

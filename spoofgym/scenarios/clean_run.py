@@ -12,6 +12,7 @@ from spoofgym.kernels import njit
 from spoofgym.mechanization import mechanize
 from spoofgym.navigation.divergence import FilterDivergedError, diverged_error
 from spoofgym.navigation.interface import Decision
+from spoofgym.navigation.loose.inertial import InertialBatch
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.loose.warm_start import NUM_JOINT
@@ -149,7 +150,7 @@ def _coast(
 
 
 def _states(
-    navigator: StrapdownNavigator, initial: Floats, deviation: Floats, *more: Callable[[], Floats]
+    navigator: InertialBatch, initial: Floats, deviation: Floats, *more: Callable[[], Floats]
 ) -> list[Floats]:
     """Attitude, velocity, position, bias, P, (E + 1, ...), NIS and its degrees, (E,), and more, (E + 1, ...).
 

@@ -17,6 +17,7 @@ from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.logs.table import seconds
+from spoofgym.navigation.divergence import Solution
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
@@ -214,28 +215,17 @@ class RecordedRanges(RecordedScenario):
         transition = np.empty((stop - first, NUM_NAVIGATION, NUM_STATES))
         noise = np.empty((stop - first, NUM_NAVIGATION, NUM_NAVIGATION))
         density = np.diag(model.filter_density[:NUM_NAVIGATION])
-        bounds, places = model.parts
-        one = np.empty((NUM_NAVIGATION, NUM_STATES))
+        steps = model.steps
+        one, no_noise, force = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty(0), np.empty(3)
         for k in range(first, stop):
-            attitude, velocity, position = clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy()
+            solution = Solution(
+                clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy(), clean.bias[k].copy()
+            )
             total, gathered = np.eye(NUM_NAVIGATION, NUM_STATES), np.zeros((NUM_NAVIGATION, NUM_NAVIGATION))
-            for part in range(places[k], places[k + 1]):
+            for part in range(steps.places[k], steps.places[k + 1]):
+                span = (steps.bounds[part], steps.bounds[part + 1], -1)
                 length = mechanize_part(
-                    bounds[part],
-                    bounds[part + 1],
-                    -1,
-                    -clean.bias[k],
-                    np.empty(0),
-                    model.angular_rate,
-                    model.specific_force,
-                    model.step,
-                    model.true_noise,
-                    attitude,
-                    velocity,
-                    position,
-                    np.empty((6, 3)),
-                    np.empty(3),
-                    one,
+                    span, -solution.bias, no_noise, steps.samples, solution, np.empty((6, 3)), force, one
                 )
                 phi, half = one[:, :NUM_NAVIGATION], 0.5 * length * density
                 total = phi @ total

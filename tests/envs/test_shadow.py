@@ -8,7 +8,7 @@ import pytest
 
 from spoofgym.envs.shadow import shadow_model
 from spoofgym.envs.spoofer import SpooferEnv
-from spoofgym.envs.spoofer_game import INNOVATION_UNIT
+from spoofgym.envs.spoofer_seat import INNOVATION_UNIT
 from spoofgym.optimum import expected_play
 from spoofgym.scenario import SimulatedScenario
 from spoofgym.scenarios import make_scenario
@@ -36,11 +36,11 @@ def test_means_are_those_of_the_model_that_the_spoofer_believes_in(shadow: str |
     whitened, offsets = [], []
     for action in rates(12):
         env.step(action)
-        whitened.append(env.game.shadow.whitened[0].copy())
-        offsets.append(env.game.offset[0].copy())
+        whitened.append(env.game.seat.shadow.whitened[0].copy())
+        offsets.append(env.game.seat.offset[0].copy())
     play = expected_play(make_scenario(shadow or SHORT).linear_model(), np.array(offsets), 25.9)
     np.testing.assert_allclose(whitened, play.whitened, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(env.game.shadow.position_error[0, :2], play.final_error, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(env.game.seat.shadow.position_error[0, :2], play.final_error, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("shadow", WRONG)
@@ -79,7 +79,7 @@ def test_innovation_action_goes_through_the_wrong_filter() -> None:
     believed = make_scenario(WRONG[1]).linear_model().innovation_factor[1]
     change = env.game.simulation.epoch.innovation.whitened[0] - clean.game.simulation.epoch.innovation.whitened[0]
     np.testing.assert_allclose(change, np.linalg.solve(mine, believed @ (INNOVATION_UNIT * wanted)), rtol=1e-9)
-    np.testing.assert_allclose(env.game.shadow.whitened[0], INNOVATION_UNIT * wanted, rtol=1e-9)
+    np.testing.assert_allclose(env.game.seat.shadow.whitened[0], INNOVATION_UNIT * wanted, rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -88,11 +88,11 @@ def test_four_rates_move_position_and_clock() -> None:
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (4,), np.float32)
     env.reset(seed=0)
     env.step(np.array([0.5, -0.25, 0.1, 1.0]))
-    np.testing.assert_allclose(env.game.offset[0], [1.0, -0.5, 0.2, 2.0])
+    np.testing.assert_allclose(env.game.seat.offset[0], [1.0, -0.5, 0.2, 2.0])
     *_, info = env.step(np.array([0.0, 0.0, 0.0, -7.0]))
-    np.testing.assert_allclose(env.game.offset[0], [1.0, -0.5, 0.2, 0.0], atol=1e-12)
-    assert env.game.simulation.clock_offset[0] == env.game.offset[0, 3]
-    assert info["clock_error"] == pytest.approx(env.game.clock_error[0])
+    np.testing.assert_allclose(env.game.seat.offset[0], [1.0, -0.5, 0.2, 0.0], atol=1e-12)
+    assert env.game.simulation.clock_offset[0] == env.game.seat.offset[0, 3]
+    assert info["clock_error"] == pytest.approx(env.game.seat.clock_error[0])
     for scenario, rate in ((KUJUR, 0.25), (LIU, 0.25), (KUJUR + ",drag_off_rate=4", 4.0)):
         rates = make_scenario(scenario)
         assert (rates.drag_off_rate, rates.clock_rate) == ((rate, rate, rate), rate)
@@ -125,7 +125,7 @@ def test_entries_of_the_spoofer_are_those_of_the_page(knowledge: str, place: int
     seen = env.step(np.array([0.0, 0.0, 0.0, 0.5]))[0]
     assert seen[3] == pytest.approx(1.0 / 11.0)
     if knowledge != "blind":
-        clock = env.game.shadow.clock_error[0]
+        clock = env.game.seat.shadow.clock_error[0]
         assert seen[names.index("mean clock error")] == pytest.approx(clock / (10.0 + abs(clock)), rel=1e-6)
         assert clock > 0.3
 
@@ -138,8 +138,8 @@ def test_the_tracking_error_moves_the_position_and_never_the_clock() -> None:
     for _ in range(40):
         vector.step(np.tile([0.1, 0.0, 0.0, 0.2], (50, 1)))
         game = vector.game
-        sent.append(game.simulation.offset - game.offset[:, :3])
-        np.testing.assert_array_equal(game.simulation.clock_offset, game.offset[:, 3])
+        sent.append(game.simulation.offset - game.seat.offset[:, :3])
+        np.testing.assert_array_equal(game.simulation.clock_offset, game.seat.offset[:, 3])
     assert np.std(sent) == pytest.approx(0.5, rel=0.1)
 
 

@@ -12,7 +12,8 @@ import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.arrays import Floats
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender import DefenderEnv
-from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
+from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
 from spoofgym.tight_scenario import TightScenario
@@ -78,7 +79,7 @@ def test_a_game_under_few_rising_and_setting_satellites(sky: tuple[float, float]
         np.testing.assert_array_equal(by_slot(game, "satellite in slot"), there)
         np.testing.assert_allclose(entries(game)["satellites in view"], there.sum(axis=1), rtol=1e-5)
         assert not by_slot(game, "code residual of slot")[~there].any()
-        masks = game.action_masks()
+        masks = game.seat.action_masks()
         assert masks.shape == (6, 2 + 5 + 2 * slots)
         assert masks[:, :7].all()
         assert masks[:, 7::2].all()
@@ -101,7 +102,7 @@ def test_an_outage_empties_the_sky() -> None:
         lost += int(out.sum())
         assert not by_slot(game, "satellite in slot")[out].any()
         assert not by_slot(game, "code residual of slot")[out].any()
-        assert not game.action_masks()[out, 8::2].any()
+        assert not game.seat.action_masks()[out, 8::2].any()
         outcome = game.step(leaving(game, 0, 3))
         np.testing.assert_array_equal(outcome.ignored, np.where(out, 2, 0))
         np.testing.assert_array_equal(outcome.left_out, np.where(out, 0, 2))
@@ -187,8 +188,8 @@ def test_unused_satellites_are_no_reason_to_backtrack() -> None:
     action = leaving(game, 0, 1)
     action[:, 1] = 2
     outcome = game.step(action)
-    assert (outcome.backtrack_asked[0], outcome.used[0], game.coast[0]) == (0, True, 0)
-    assert not game.excluding[0]
+    assert (outcome.backtrack_asked[0], outcome.used[0], game.seat.coast[0]) == (0, True, 0)
+    assert not game.seat.excluding[0]
     action[:, 0] = EXCLUDE
     assert game.step(action).backtrack_asked[0] == 10
 

@@ -46,7 +46,7 @@ def test_a_game_pays_its_survival_times_what_it_gained():
         _, reward, terminated, _, info = environment.step(np.tile(ACTION, (3, 1)))
         total += reward
         np.testing.assert_allclose(info["reward_terms"]["growth"] + info["reward_terms"]["forfeit"], reward)
-        noncentrality = np.sum(environment.game.shadow.whitened**2, axis=1)
+        noncentrality = np.sum(environment.game.seat.shadow.whitened**2, axis=1)
         survival *= stats.ncx2.cdf(25.9, 3, noncentrality)
     assert terminated.all()
     np.testing.assert_allclose(total, survival * (environment.game.error - start) / 10.0, rtol=1e-9)

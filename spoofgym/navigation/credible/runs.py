@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
+from spoofgym.navigation.batch import NO_DEMANDS, FilterBatch, Weights
 from spoofgym.navigation.credible.kalman import (
     HEIGHT,
     POSITIONS,
@@ -19,8 +21,8 @@ from spoofgym.navigation.credible.kalman import (
     settled_covariance,
     update_covariance,
 )
+from spoofgym.navigation.history import History, Ring, keep
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.odometer import Odometer, OdometerGrade, PlanarMotion, draw_displacement
 from spoofgym.streams import RunStreams
@@ -29,8 +31,6 @@ GRAIN = 256
 """Runs below which a slice is not worth a thread."""
 ANCHORING = ("anchored", "credited", "free")
 NEVER = np.iinfo(np.int64).max
-NUM_KEPT = 10
-"""Numbers of the history per epoch: 6 errors, 3 of the covariance, the credit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,11 +80,37 @@ class CredibleModel(Immutable):
     rule: AuxiliaryRule
 
 
-class CredibleNavigator:
+class CredibleSteps(NamedTuple):
+    """What kernels carry runs with: numbers of the tuning and the rule, and the true motion of each odometer step."""
+
+    step: float
+    density: float
+    auxiliary_variance: float
+    fix_variance: float
+    samples: int
+    needed: int
+    displacement: Floats
+    velocity: Floats
+
+
+class CredibleRuns(NamedTuple):
+    """The arrays of `CredibleNavigator` that its kernels change, and the odometer, fix and weight they use."""
+
+    epoch: Runs
+    state: Floats
+    covariance: Floats
+    credit: Runs
+    displacement: Floats
+    deviation: Floats
+    noise_scale: Floats
+
+
+class CredibleNavigator(FilterBatch):
     """N credible filters, each with a covariance of its own; the height is known.
 
     The innovation is formed after the auxiliary update of the epoch. Its third component is the receiver's noise (and
-    offset) in height alone, with a gain of zero.
+    offset) in height alone, with a gain of zero. The unaided solution is the auxiliary position, which is a part of the
+    filter.
 
     Attributes:
         model: the game.
@@ -92,15 +118,11 @@ class CredibleNavigator:
         covariance: [pp, pv, vv] of either axis, (N, 3), m², m²/s, m²/s².
         credit: fixes used in a row, (N,), as far as the rule counts them.
         displacement: what the odometer gives for each step of the episode, (N, J, 2), m.
-        index: the epoch where each run stands, (N,); -1 before the first.
-        diverged: whether the filter has diverged, (N,); a linear one never does.
-        backtracked: epochs that the last `resolve` took back, (N,).
-        history: epochs that can be taken back.
     """
 
-    def __init__(
-        self, model: CredibleModel, num_runs: int, slices: RunSlices, demands: Demands = NO_DEMANDS
-    ) -> None:
+    grain = carry_grain = GRAIN
+
+    def __init__(self, model: CredibleModel, num_runs: int, slices: RunSlices, demands: Demands = NO_DEMANDS) -> None:
         """Allocate ``num_runs`` runs; `reset` starts them.
 
         Args:
@@ -109,20 +131,41 @@ class CredibleNavigator:
             slices: the threads to use.
             demands: of the players; whether fixes are left out makes no difference here.
         """
+        super().__init__(num_runs, 3, slices, replace(demands, auxiliary=False))
+        tuning, motion = model.tuning, model.motion
         self.model = model
         self.state = np.zeros((num_runs, 6))
         self.covariance = np.zeros((num_runs, 3))
         self.credit = np.zeros(num_runs, dtype=np.int64)
-        self.displacement = np.zeros((num_runs, model.motion.num_steps, 2))
-        self.index = np.full(num_runs, -1)
-        self.diverged = np.zeros(num_runs, dtype=bool)  # a linear filter never does
-        self.backtracked = np.zeros(num_runs, dtype=np.int64)
-        self.history = demands.history
-        self._past = np.zeros((num_runs, demands.history + 1 if demands.history else 0, NUM_KEPT))
-        self._deviation = np.zeros((num_runs, 3))
-        self._settled = settled_covariance(model.tuning)
-        self._slices = slices
-        self._all = np.arange(num_runs)
+        self.displacement = np.zeros((num_runs, motion.num_steps, 2))
+        self._settled = settled_covariance(tuning)
+        self._noise_scale = np.ones(num_runs)
+        self._steps = CredibleSteps(
+            tuning.step,
+            tuning.acceleration**2,
+            tuning.auxiliary_sigma**2,
+            tuning.fix_sigma**2,
+            tuning.samples,
+            model.rule.needed,
+            motion.displacement,
+            motion.velocity,
+        )
+        self._runs = CredibleRuns(
+            self.index,
+            self.state,
+            self.covariance,
+            self.credit,
+            self.displacement,
+            self._deviation,
+            self._noise_scale,
+        )
+        self.past = History(
+            demands.history,
+            np.zeros((num_runs, 0, 0)),
+            state=self.state,
+            covariance=self.covariance,
+            credit=self.credit,
+        )
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0, the auxiliary position anchored to the filter's.
@@ -132,9 +175,8 @@ class CredibleNavigator:
             initial: joint state drawn for them, (n, 30).
             streams: the random streams of all runs.
         """
+        super().reset(runs, initial, streams)
         model = self.model
-        self.index[runs] = -1
-        self.backtracked[runs] = 0
         self.state[runs] = initial[:, [*POSITIONS, *VELOCITIES, *POSITIONS]]
         self.covariance[runs] = self._settled
         self.credit[runs] = 0 if model.rule.needed == NEVER else model.rule.needed
@@ -145,47 +187,13 @@ class CredibleNavigator:
         """Set the auxiliary position of runs to the filter's, whatever the rule."""
         self.state[runs, 4:] = self.state[runs, :2]
 
-    def propagate(self, runs: Runs | None = None) -> None:
-        """Carry runs (all by default) to their next epoch by odometer and INS."""
-        runs = self._all if runs is None else runs
-        self.index[runs] += 1
-        self._carry(runs, np.zeros(len(runs), dtype=np.int64))
+    def _carry(self, runs: Runs, epochs: Runs, auxiliary: Floats) -> None:
+        _carry(runs, epochs, self._steps, self._runs, self.past.ring)
 
-    def _carry(self, runs: Runs, depth: Runs) -> None:
-        """Carry runs over their present epoch and as many before it as ``depth`` (n,) says, without any fix."""
-        model, tuning = self.model, self.model.tuning
-        self._slices.call(
-            lambda part: _carry(
-                part,
-                runs,
-                depth,
-                self.index,
-                tuning.step,
-                tuning.acceleration**2,
-                tuning.auxiliary_sigma**2,
-                tuning.samples,
-                self.displacement,
-                model.motion.displacement,
-                model.motion.velocity,
-                self.state,
-                self.covariance,
-                self.credit,
-                self._past,
-            ),
-            self._all[: len(runs)],
-            GRAIN,
-        )
-
-    def innovate(self, deviation: Floats, runs: Runs | None = None) -> Innovation:
-        """Form the innovation of the present epoch of runs (all by default).
-
-        Args:
-            deviation: receiver noise plus offset, (n, 3), m ENU.
-            runs: which, (n,).
-        """
-        runs = self._all if runs is None else runs
-        self._deviation[runs] = deviation
-        residual = -np.asarray(deviation, dtype=np.float64)
+    def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
+        """The innovation of the fix as it is; only `_correct` weights it."""
+        self._noise_scale[runs] = weights.noise_scale
+        residual = -self._deviation[runs]
         residual[:, :HEIGHT] += self.state[runs, :2]
         tuning = self.model.tuning
         sigma = np.full((len(runs), 3), tuning.height_sigma)
@@ -202,38 +210,24 @@ class CredibleNavigator:
         Raises:
             ValueError: a backtrack without a history.
         """
-        runs = self._all if runs is None else runs
-        self._take_back(decision, runs)
-        nothing = np.zeros(len(runs))
-        _correct(
-            runs,
-            np.asarray(decision.use),
-            nothing if decision.reset is None else np.asarray(decision.reset, dtype=np.float64),
-            nothing + 1.0 if decision.noise_scale is None else np.asarray(decision.noise_scale, dtype=np.float64),
-            self.model.tuning.fix_sigma**2,
-            self.model.rule.needed,
-            self._deviation,
-            self.state,
-            self.covariance,
-            self.credit,
-        )
+        super().resolve(decision, runs)
+        self.credit[self._select(runs)[~np.asarray(decision.use)]] = 0
 
-    def _take_back(self, decision: Decision, runs: Runs) -> None:
-        """Restore the states before the fixes taken back, and carry them to the present epoch without these."""
-        self.backtracked[runs] = 0
-        if decision.backtrack is None or not decision.backtrack.any():
-            return
-        if not self.history:
-            raise ValueError("a backtrack is decided, but the navigator keeps no history: demand one when it is built")
-        depth = np.minimum(np.minimum(decision.backtrack, self.history), self.index[runs])
-        self.backtracked[runs] = depth
-        back = depth > 0
-        runs, depth = runs[back], depth[back]
-        if len(runs):
-            kept = self._past[runs, (self.index[runs] - depth) % self._past.shape[1]]
-            self.state[runs], self.covariance[runs] = kept[:, :6], kept[:, 6:9]
-            self.credit[runs] = kept[:, 9]
-            self._carry(runs, depth)
+    def _correct(self, runs: Runs) -> None:
+        self._on_slices(lambda part: _correct(part, self._steps, self._runs), runs)
+
+    def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
+        _reset(runs, variance, self._steps, self._runs)
+
+    def _solution(self, runs: Runs) -> tuple[Floats, ...]:
+        raise NotImplementedError("the unaided solution is a part of the filter")
+
+    def _moved(self, before: tuple[Floats, ...], after: tuple[Floats, ...]) -> Floats:
+        raise NotImplementedError("the unaided solution is a part of the filter")
+
+    def _past_error(self, epochs: Runs) -> Floats:
+        state = self.past.recall("state", epochs)
+        return np.concatenate([state[:, :, :2], np.zeros((*epochs.shape, 1))], axis=2)
 
     @property
     def error(self) -> Floats:
@@ -264,79 +258,59 @@ class CredibleNavigator:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carry(
-    places: Runs,
-    runs: Runs,
-    depth: Runs,
-    index: Runs,
-    step: float,
-    density: float,
-    variance: float,
-    samples: int,
-    displacement: Floats,
-    true_displacement: Floats,
-    true_velocity: Floats,
-    state: Floats,
-    covariance: Floats,
-    credit: Runs,
-    past: Floats,
-) -> None:
-    """Epochs index - depth .. index of runs; what was known before each is kept."""
-    slots = past.shape[1]
-    for place in places:
-        run = runs[place]
-        for k in range(index[run] - depth[place], index[run] + 1):
-            if slots > 0:
-                kept = past[run, k % slots]
-                kept[:6] = state[run]
-                kept[6:9] = covariance[run]
-                kept[9] = credit[run]
+def _carry(runs: Runs, epochs: Runs, steps: CredibleSteps, filters: CredibleRuns, ring: Ring) -> None:
+    """Carry runs over so many epochs each; what was known before each is kept."""
+    samples = steps.samples
+    for run in runs:
+        for left in range(epochs[run] - 1, -1, -1):
+            filters.epoch[run] += 1
+            k = filters.epoch[run]
+            keep(run, k, ring)
             first, last = k * samples, (k + 1) * samples
             carry(
-                step,
-                density,
-                variance,
-                displacement[run, first:last],
-                true_displacement[first:last],
-                true_velocity[first : last + 1],
-                state[run],
-                covariance[run],
+                steps.step,
+                steps.density,
+                steps.auxiliary_variance,
+                filters.displacement[run, first:last],
+                steps.displacement[first:last],
+                steps.velocity[first : last + 1],
+                filters.state[run],
+                filters.covariance[run],
             )
-            if k < index[run]:
-                credit[run] = 0
+            if left > 0:  # its fix has been taken back
+                filters.credit[run] = 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _correct(
-    runs: Runs,
-    use: Flags,
-    reset: Floats,
-    noise_scale: Floats,
-    variance: float,
-    needed: int,
-    deviation: Floats,
-    state: Floats,
-    covariance: Floats,
-    credit: Runs,
-) -> None:
-    """The credible update (eq 9) where the fix is used, and the anchoring of the auxiliary position."""
+def _correct(runs: Runs, steps: CredibleSteps, filters: CredibleRuns) -> None:
+    """The credible update (eq 9), and the anchoring of the auxiliary position."""
+    for run in runs:
+        state, deviation = filters.state[run], filters.deviation[run]
+        variance = filters.noise_scale[run] * steps.fix_variance
+        position_gain, velocity_gain = update_covariance(variance, filters.covariance[run])
+        for a in range(2):
+            innovation = deviation[a] - state[a]
+            state[a] += position_gain * innovation
+            state[2 + a] += velocity_gain * innovation
+        _anchor(run, steps.needed, filters)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _reset(runs: Runs, variance: Floats, steps: CredibleSteps, filters: CredibleRuns) -> None:
+    """The position jumps to the fix; the auxiliary position is anchored."""
     for place in range(len(runs)):
         run = runs[place]
-        if not use[place]:
-            credit[run] = 0
-            continue
-        if reset[place] > 0.0:
-            for a in range(2):
-                state[run, a] = deviation[run, a]
-            covariance[run, 0] = reset[place]
-            covariance[run, 1] = 0.0
-        else:
-            position_gain, velocity_gain = update_covariance(noise_scale[place] * variance, covariance[run])
-            for a in range(2):
-                innovation = deviation[run, a] - state[run, a]
-                state[run, a] += position_gain * innovation
-                state[run, 2 + a] += velocity_gain * innovation
-        credit[run] = min(credit[run] + 1, needed)
-        if credit[run] >= needed:
-            for a in range(2):
-                state[run, 4 + a] = state[run, a]
+        for a in range(2):
+            filters.state[run, a] = filters.deviation[run, a]
+        filters.covariance[run, 0] = variance[place]
+        filters.covariance[run, 1] = 0.0
+        _anchor(run, steps.needed, filters)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _anchor(run: int, needed: int, filters: CredibleRuns) -> None:
+    """Count a fix that a run has used, and set the auxiliary position to the filter's where there are enough."""
+    filters.credit[run] = min(filters.credit[run] + 1, needed)
+    if filters.credit[run] >= needed:
+        for a in range(2):
+            filters.state[run, 4 + a] = filters.state[run, a]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.batch import NO_DEMANDS, FilterBatch, Weights
 from spoofgym.navigation.interface import Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.adaptation import Adaptation, adapt, negative_ratio
+from spoofgym.navigation.loose.innovation import FilterNoise
 from spoofgym.navigation.loose.own_gains import GRAIN, OwnCovarianceNavigator
-from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.parallel import RunSlices
@@ -29,8 +32,11 @@ class SelfTuning:
     """
 
     def __init__(self, adaptation: Adaptation, initial: Floats, num_runs: int, history: int, slices: RunSlices) -> None:
-        """Allocate ``num_runs`` runs, which begin with R = ``initial`` (m, m); a history takes windows back, too."""
-        m, slots = len(initial), history + 1 if history else 0
+        """Allocate ``num_runs`` runs, which begin with R = ``initial`` (m, m).
+
+        The windows hold so many more fixes that ``history`` epochs can be taken back.
+        """
+        m = len(initial)
         length = adaptation.window + adaptation.delay + history
         self.adaptation = adaptation
         self.noise = np.tile(initial, (num_runs, 1, 1))
@@ -45,9 +51,16 @@ class SelfTuning:
         self._nis = np.zeros(num_runs)
         self._weight = np.ones(num_runs)
         self._slices = slices
-        self._slots = slots
-        self._adapted = (self.noise, self.scale, self.count)
-        self._past = tuple(np.zeros((num_runs, slots, *part.shape[1:]), part.dtype) for part in self._adapted)
+
+    @property
+    def filter_noise(self) -> FilterNoise:
+        """R and the factor on Q of each run, as kernels take them."""
+        return FilterNoise(self.noise, np.arange(len(self.scale)), self.scale)
+
+    @property
+    def learnt(self) -> dict[str, Any]:
+        """What a backtrack takes back, for a history."""
+        return {"noise": self.noise, "process_scale": self.scale, "count": self.count}
 
     def reset(self, runs: Runs) -> None:
         """Forget what runs have learnt."""
@@ -105,30 +118,9 @@ class SelfTuning:
             self.scale,
         )
 
-    def keep(self, runs: Runs, index: Runs) -> None:
-        """Write what runs know after their epochs ``index`` (n,) into the history."""
-        if self._slots:
-            for ring, part in zip(self._past, self._adapted, strict=True):
-                ring[runs, (index + 1) % self._slots] = part[runs]
 
-    def take_back(self, runs: Runs, index: Runs, depth: Runs) -> None:
-        """Forget the fixes of the last epochs before the present ones.
-
-        Args:
-            runs: which, (n,).
-            index: their present epochs, (n,).
-            depth: fixes taken back, (n,).
-        """
-        first = index - depth
-        for ring, part in zip(self._past, self._adapted, strict=True):
-            part[runs] = ring[runs, first % self._slots]
-        for back in range(int(depth.max(initial=0))):
-            left = depth > back
-            self.keep(runs[left], index[left] - back - 1)
-
-
-class AdaptiveNavigator(OwnCovarianceNavigator):
-    """N self-tuning filters in the linear fidelity.
+class SelfTuningBatch(FilterBatch):
+    """N filters that tune themselves, in either fidelity.
 
     The innovation has the R matched to the fixes before it, R_{k-1}: with R_k, as the paper's (14) reads, S would hold
     the residual of the fix under test. A fix that is left out, or reset to, does not enter the windows. `resolve`
@@ -137,6 +129,26 @@ class AdaptiveNavigator(OwnCovarianceNavigator):
     Attributes:
         tuned: what the filters have learnt of their noises.
     """
+
+    tuned: SelfTuning
+    model: LinearModel | StrapdownModel
+
+    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
+        """Start new episodes just before epoch 0 with the initial R and Q and empty windows."""
+        super().reset(runs, initial, streams)
+        self.tuned.reset(runs)
+
+    def _formed(self, runs: Runs, innovation: Innovation, weights: Weights) -> None:
+        self.tuned.note(runs, innovation, weights.noise_scale)
+
+    def _corrected(self, runs: Runs) -> None:
+        self.tuned.adapt(runs, self.index, self.model.time)
+
+
+class AdaptiveNavigator(SelfTuningBatch, OwnCovarianceNavigator):
+    """N self-tuning filters in the linear fidelity."""
+
+    model: LinearModel
 
     def __init__(
         self,
@@ -148,43 +160,16 @@ class AdaptiveNavigator(OwnCovarianceNavigator):
         adaptation: Adaptation,
         demands: Demands = NO_DEMANDS,
     ) -> None:
-        """As for `LinearNavigator`; ``model`` is of the filter that all runs begin with."""
-        super().__init__(model, grade, interval, num_runs, slices, demands)
+        """As for `OwnCovarianceNavigator`; ``model`` is of the filter that all runs begin with."""
         self.tuned = SelfTuning(adaptation, model.measurement_covariance, num_runs, demands.history, slices)
-        self._measurement_covariance = self.tuned.noise
-        self._process_scale = self.tuned.scale
-
-    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
-        """Start new episodes just before epoch 0 with the initial R and Q and empty windows."""
-        super().reset(runs, initial, streams)
-        self.tuned.reset(runs)
-
-    def propagate(self, runs: Runs | None = None) -> None:
-        """Carry runs (all by default) to their next epoch."""
-        runs = self._all if runs is None else runs
-        self.tuned.keep(runs, self.index[runs])
-        super().propagate(runs)
-
-    def _innovate(self, runs: Runs, noise_scale: Floats) -> Innovation:
-        innovation = super()._innovate(runs, noise_scale)
-        self.tuned.note(runs, innovation, noise_scale)
-        return innovation
-
-    def _correct(self, runs: Runs) -> None:
-        super()._correct(runs)
-        self.tuned.adapt(runs, self.index, self.model.time)
-
-    def _go_back(self, runs: Runs) -> None:
-        self.tuned.take_back(runs, self.index[runs], self.backtracked[runs])
-        super()._go_back(runs)
+        super().__init__(model, grade, interval, num_runs, slices, demands, self.tuned.filter_noise)
+        self.past.add(**self.tuned.learnt)
 
 
-class AdaptiveStrapdownNavigator(StrapdownNavigator):
-    """N self-tuning filters in the strapdown fidelity; otherwise as `AdaptiveNavigator`.
+class AdaptiveStrapdownNavigator(SelfTuningBatch, StrapdownNavigator):
+    """N self-tuning filters in the strapdown fidelity."""
 
-    Attributes:
-        tuned: what the filters have learnt of their noises.
-    """
+    model: StrapdownModel
 
     def __init__(
         self,
@@ -195,30 +180,6 @@ class AdaptiveStrapdownNavigator(StrapdownNavigator):
         demands: Demands = NO_DEMANDS,
     ) -> None:
         """As for `StrapdownNavigator`; the filter begins with the R of the model's first epoch."""
-        super().__init__(model, num_runs, slices, demands)
         self.tuned = SelfTuning(adaptation, model.measurement_covariance[0], num_runs, demands.history, slices)
-        self._measurement_covariance = self.tuned.noise
-        self._noise_row = self._all
-        self._process_scale = self.tuned.scale
-
-    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
-        """Start new episodes just before epoch 0 with the initial R and Q and empty windows."""
-        super().reset(runs, initial, streams)
-        self.tuned.reset(runs)
-
-    def _keep(self, runs: Runs) -> None:
-        super()._keep(runs)
-        self.tuned.keep(runs, self.index[runs])
-
-    def _innovate(self, runs: Runs, noise_scale: Floats) -> Innovation:
-        innovation = super()._innovate(runs, noise_scale)
-        self.tuned.note(runs, innovation, noise_scale)
-        return innovation
-
-    def _correct(self, runs: Runs) -> None:
-        super()._correct(runs)
-        self.tuned.adapt(runs, self.index, self.model.time)
-
-    def _backtrack_slice(self, runs: Runs) -> None:
-        self.tuned.take_back(runs, self.index[runs], self.backtracked[runs])
-        super()._backtrack_slice(runs)
+        super().__init__(model, num_runs, slices, demands, self.tuned.filter_noise)
+        self.past.add(**self.tuned.learnt)

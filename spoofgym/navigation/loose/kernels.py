@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
@@ -9,7 +11,11 @@ from spoofgym.geodesy import enu_difference, enu_displacement
 from spoofgym.kernels import njit
 from spoofgym.mechanization import load_matrix, mechanize, product, rotation, transpose
 from spoofgym.navigation import kalman
+from spoofgym.navigation.batch import InnovationArrays
+from spoofgym.navigation.divergence import Solution, solution_of
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
+from spoofgym.navigation.history import Ring, keep
+from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, form_innovation
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
 
 # rows of the state kept when a fix is taken
@@ -19,99 +25,147 @@ NUM_SAMPLE_NOISES = 6
 NUM_EPOCH_NOISES = 9
 
 
+class Samples(NamedTuple):
+    """Inertial samples of a game.
+
+    Attributes:
+        angular_rate: of the true motion or measured, body R, F, U, (samples, 3), rad/s.
+        specific_force: of the same, (samples, 3), m/s².
+        step: duration of each, (samples,), s.
+        true_noise: standard deviation density of what acts on rate, force and position of each run, (9,).
+    """
+
+    angular_rate: Floats
+    specific_force: Floats
+    step: Floats
+    true_noise: Floats
+
+
+class StrapdownSteps(NamedTuple):
+    """The arrays of a `StrapdownModel` that kernels carry runs with.
+
+    Attributes:
+        samples: of the game.
+        bounds: samples bounds[p]..bounds[p+1] are part p, (P+1,).
+        places: parts places[k]..places[k+1] lead to epoch k, (K+2,).
+        latency_samples: inertial samples between the fix and its epoch.
+        filter_density: the filter's process noise, (15,), unit²/s.
+        instability_sigma: of the biases, (6,).
+        instability_decay: over an epoch.
+    """
+
+    samples: Samples
+    bounds: Runs
+    places: Runs
+    latency_samples: int
+    filter_density: Floats
+    instability_sigma: Floats
+    instability_decay: float
+
+
+class FixReference(NamedTuple):
+    """What fixes are compared with: place and velocity (K+1, 3) of the antenna, lever arm (3,), m, and latency, s."""
+
+    position: Floats
+    velocity: Floats
+    lever_arm: Floats
+    latency: float
+
+
+class StrapdownRuns(NamedTuple):
+    """The arrays of `StrapdownNavigator` that its kernels carry.
+
+    Attributes:
+        epoch: where each run stands, (N,).
+        solution: of all runs.
+        true_bias: (N, 6).
+        instability: the part of it that drifts, (N, 6).
+        fix: the state kept when the fix is taken, (N, 6, 3).
+        normals: noise of B epochs in a ring, (N, B, W), W = 6 samples + 9 of the epoch; W = 0 where the samples have
+            errors of their own.
+    """
+
+    epoch: Runs
+    solution: Solution
+    true_bias: Floats
+    instability: Floats
+    fix: Floats
+    normals: Floats
+
+
 @njit(cache=True, nogil=True)
-def propagate(
+def carry(
     runs: Runs,
-    index: Runs,
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
-    bias: Floats,
-    true_bias: Floats,
-    instability: Floats,
-    covariance: Floats,
-    fix: Floats,
-    normals: Floats,
-    angular_rate: Floats,
-    specific_force: Floats,
-    step: Floats,
-    bounds: Runs,
-    places: Runs,
-    latency_samples: int,
-    filter_density: Floats,
-    process_scale: Floats,
-    true_noise: Floats,
-    instability_sigma: Floats,
-    instability_decay: float,
+    epochs: Runs,
+    steps: StrapdownSteps,
+    noise: FilterNoise,
+    vehicles: StrapdownRuns,
+    ring: Ring,
     auxiliary: Floats,
 ) -> None:
-    """Carry runs over one epoch, part by part: mechanization, covariance, and the state kept when the fix is taken.
+    """Carry runs over so many epochs each, part by part: mechanization, covariance, and the state kept at the fix.
 
-    Shapes as in `StrapdownNavigator` and `StrapdownModel`; normals (N, B, W) hold the noise of B epochs
-    in a ring, W = 6 samples + 9 of the epoch, or 0 where the samples have errors of their own. The unaided solution
-    minus the filter, auxiliary (N, 15), is carried by the same Φ, or is none, (N, 0).
+    The states are kept before every epoch. The unaided solution minus the filter, auxiliary (N, 15), is carried by the
+    same Φ, or is none, (N, 0).
     """
     mean_force, residual_bias, mean = np.empty(3), np.empty(6), np.empty(NUM_NAVIGATION)
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
     half_noise = np.zeros((NUM_STATES, NUM_STATES))
+    epoch, normals, true_noise = vehicles.epoch, vehicles.normals, steps.samples.true_noise
     noisy = normals.shape[2] > 0
     last = normals.shape[2] - NUM_EPOCH_NOISES
     for run in runs:
-        index[run] += 1
-        noise = normals[run, index[run] % normals.shape[1]]
-        for a in range(6):
-            residual_bias[a] = true_bias[run, a] - bias[run, a]
-        begin, end = places[index[run]], places[index[run] + 1]
-        start, interval = bounds[begin], 0.0
-        taken = bounds[end] - latency_samples
-        for part in range(begin, end):
-            length = mechanize_part(
-                bounds[part],
-                bounds[part + 1],
-                taken,
-                residual_bias,
-                noise[NUM_SAMPLE_NOISES * (bounds[part] - start) :],
-                angular_rate,
-                specific_force,
-                step,
-                true_noise,
-                attitude[run],
-                velocity[run],
-                position[run],
-                fix[run],
-                mean_force,
-                transition,
-            )
-            for i in range(NUM_STATES):
-                half_noise[i, i] = 0.5 * length * filter_density[i] * process_scale[run]
-                covariance[run, i, i] += half_noise[i, i]
-            kalman.predict_covariance(transition, half_noise, covariance[run], product)
-            if auxiliary.shape[1] > 0:
-                kalman.predict_mean(transition, auxiliary[run], mean)
-            interval += length
-        if noisy:
-            disturb_position(position[run], true_noise, np.sqrt(interval), noise[last:])
-            _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, noise[last:])
-        if latency_samples == 0:
-            _keep_fix(attitude[run], velocity[run], position[run], fix[run])
-        for a in range(3):
-            fix[run, FORCE, a] = mean_force[a]
+        solution, true_bias, fix = solution_of(run, vehicles.solution), vehicles.true_bias[run], vehicles.fix[run]
+        covariance = ring.covariance[run]
+        for _ in range(epochs[run]):
+            keep(run, epoch[run] + 1, ring)
+            epoch[run] += 1
+            drawn = normals[run, epoch[run] % normals.shape[1]]
+            for a in range(6):
+                residual_bias[a] = true_bias[a] - solution.bias[a]
+            begin, end = steps.places[epoch[run]], steps.places[epoch[run] + 1]
+            start, interval = steps.bounds[begin], 0.0
+            taken = steps.bounds[end] - steps.latency_samples
+            for part in range(begin, end):
+                length = mechanize_part(
+                    (steps.bounds[part], steps.bounds[part + 1], taken),
+                    residual_bias,
+                    drawn[NUM_SAMPLE_NOISES * (steps.bounds[part] - start) :],
+                    steps.samples,
+                    solution,
+                    fix,
+                    mean_force,
+                    transition,
+                )
+                for i in range(NUM_STATES):
+                    half_noise[i, i] = 0.5 * length * steps.filter_density[i] * noise.process_scale[run]
+                    covariance[i, i] += half_noise[i, i]
+                kalman.predict_covariance(transition, half_noise, covariance, product)
+                if auxiliary.shape[1] > 0:
+                    kalman.predict_mean(transition, auxiliary[run], mean)
+                interval += length
+            if noisy:
+                disturb_position(solution.position, true_noise, np.sqrt(interval), drawn[last:])
+                _drift_bias(
+                    true_bias,
+                    vehicles.instability[run],
+                    steps.instability_sigma,
+                    steps.instability_decay,
+                    drawn[last:],
+                )
+            if steps.latency_samples == 0:
+                _keep_fix(solution, fix)
+            for a in range(3):
+                fix[FORCE, a] = mean_force[a]
 
 
 @njit(cache=True, nogil=True)
 def mechanize_part(
-    start: int,
-    stop: int,
-    taken: int,
+    part: tuple[int, int, int],
     residual_bias: Floats,
     noise: Floats,
-    angular_rate: Floats,
-    specific_force: Floats,
-    step: Floats,
-    true_noise: Floats,
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
+    samples: Samples,
+    solution: Solution,
     fix: Floats,
     mean_force: Floats,
     transition: Floats,
@@ -119,18 +173,12 @@ def mechanize_part(
     """Mechanize the inertial samples of a part of an epoch of one run, and form the transition of its error over it.
 
     Args:
-        start: first sample.
-        stop: the sample after the last.
-        taken: sample before which the fix is taken; it need not be one of these.
+        part: its first sample, the sample after its last, and the sample before which the fix is taken, which need not
+            be one of these.
         residual_bias: what is left of the biases, (6,).
         noise: normals, six per sample first; (0,) where the samples have errors of their own.
-        angular_rate: of the true motion, (samples, 3).
-        specific_force: likewise.
-        step: of each sample, s.
-        true_noise: standard deviation density of what acts on the samples, (9,).
-        attitude: (3, 3), in place.
-        velocity: (3,), in place.
-        position: (3,), in place.
+        samples: of the game.
+        solution: of the run, in place.
         fix: the state kept when the fix is taken, (6, 3), in place.
         mean_force: mean specific force in ENU, (3,), overwritten.
         transition: first nine rows of Φ, (9, 15), overwritten.
@@ -138,6 +186,8 @@ def mechanize_part(
     Returns:
         The length of the part, s.
     """
+    start, stop, taken = part
+    attitude, velocity, position, step = solution.attitude, solution.velocity, solution.position, samples.step
     rate, force = np.empty(3), np.empty(3)
     middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
@@ -151,14 +201,15 @@ def mechanize_part(
             middle_velocity[:] = velocity
             middle_position[:] = position
         if i == taken:
-            _keep_fix(attitude, velocity, position, fix)
+            _keep_fix(solution, fix)
         for a in range(3):
-            rate[a] = angular_rate[i, a] + residual_bias[a]
-            force[a] = specific_force[i, a] + residual_bias[3 + a]
+            rate[a] = samples.angular_rate[i, a] + residual_bias[a]
+            force[a] = samples.specific_force[i, a] + residual_bias[3 + a]
         if noisy:
             for a in range(3):
-                rate[a] += white_sample(true_noise[a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + a])
-                force[a] += white_sample(true_noise[3 + a], step[i], noise[NUM_SAMPLE_NOISES * (i - start) + 3 + a])
+                drawn = NUM_SAMPLE_NOISES * (i - start) + a
+                rate[a] += white_sample(samples.true_noise[a], step[i], noise[drawn])
+                force[a] += white_sample(samples.true_noise[3 + a], step[i], noise[drawn + 3])
         mechanize(attitude, velocity, position, rate, force, step[i], mean_force)
         interval += step[i]
     for a in range(3):
@@ -169,26 +220,19 @@ def mechanize_part(
 
 
 @njit(cache=True, nogil=True)
-def _keep_fix(attitude: Floats, velocity: Floats, position: Floats, fix: Floats) -> None:
+def _keep_fix(solution: Solution, fix: Floats) -> None:
     for a in range(3):
-        fix[POSITION, a] = position[a]
-        fix[VELOCITY, a] = velocity[a]
+        fix[POSITION, a] = solution.position[a]
+        fix[VELOCITY, a] = solution.velocity[a]
         for b in range(3):
-            fix[ATTITUDE + a, b] = attitude[a, b]
+            fix[ATTITUDE + a, b] = solution.attitude[a, b]
 
 
 @njit(cache=True, nogil=True)
 def disturb_position(position: Floats, true_noise: Floats, root: float, normals: Floats) -> None:
     """The random walk of the navigation computation over an epoch."""
-    latitude, longitude, height = enu_displacement(
-        position[0],
-        position[1],
-        position[2],
-        root * true_noise[6] * normals[0],
-        root * true_noise[7] * normals[1],
-        root * true_noise[8] * normals[2],
-    )
-    position[0], position[1], position[2] = latitude, longitude, height
+    east, north, up = root * true_noise[6], root * true_noise[7], root * true_noise[8]
+    _move(position, east * normals[0], north * normals[1], up * normals[2])
 
 
 @njit(cache=True, nogil=True)
@@ -204,56 +248,42 @@ def _drift_bias(true_bias: Floats, instability: Floats, sigma: Floats, decay: fl
 def innovate(
     places: Runs,
     runs: Runs,
-    index: Runs,
-    fix: Floats,
-    covariance: Floats,
-    fix_position: Floats,
-    fix_velocity: Floats,
-    lever_arm: Floats,
-    latency: float,
-    measurement_covariance: Floats,
-    noise_row: Runs,
+    reference: FixReference,
+    noise: FilterNoise,
     noise_scale: Floats,
-    deviation: Floats,
-    innovation: Floats,
-    gain: Floats,
-    residual: Floats,
-    whitened: Floats,
-    nis: Floats,
+    vehicles: StrapdownRuns,
+    filters: FilterRuns,
+    formed: InnovationArrays,
 ) -> None:
-    """Innovation of runs with their own S, and the whitened gain; a run's R is a row of the measurement covariances.
+    """Innovation of runs with their own S, and the whitened gain.
 
     Outputs, except the gain, stand at the places of the runs.
     """
-    m = residual.shape[1]
+    m = formed.residual.shape[1]
     observation, arm = np.zeros((m, NUM_NAVIGATION)), np.empty(3)
-    cross, factor = np.empty((m, NUM_STATES)), np.empty((m, m))
+    cross, factor = np.empty((m, filters.covariance.shape[1])), np.empty((m, m))
     for place in places:
         run = runs[place]
-        k = index[run]
+        k, fix = vehicles.epoch[run], vehicles.fix[run]
+        residual, deviation = formed.residual[place], filters.deviation[run]
         for a in range(3):
             arm[a] = 0.0
             for b in range(3):
-                arm[a] += fix[run, ATTITUDE + a, b] * lever_arm[b]
-        _observation(arm, fix[run, FORCE], latency, observation)
+                arm[a] += fix[ATTITUDE + a, b] * reference.lever_arm[b]
+        _observation(arm, fix[FORCE], reference.latency, observation)
         difference = enu_difference(
-            fix[run, POSITION, 0],
-            fix[run, POSITION, 1],
-            fix[run, POSITION, 2],
-            fix_position[k, 0],
-            fix_position[k, 1],
-            fix_position[k, 2],
+            fix[POSITION, 0],
+            fix[POSITION, 1],
+            fix[POSITION, 2],
+            reference.position[k, 0],
+            reference.position[k, 1],
+            reference.position[k, 2],
         )
         for a in range(3):
-            residual[place, a] = difference[a] + arm[a] - deviation[run, a]
+            residual[a] = difference[a] + arm[a] - deviation[a]
         for a in range(3, m):
-            residual[place, a] = fix[run, VELOCITY, a - 3] - fix_velocity[k, a - 3] - deviation[run, a]
-        noise = measurement_covariance[noise_row[run]]
-        kalman.innovation_covariance(covariance[run], observation, noise, cross, innovation[place])
-        kalman.scale_noise(noise_scale[place], noise, innovation[place])
-        kalman.cholesky(innovation[place], factor)
-        kalman.whitened_gain(cross, factor, gain[run])
-        nis[place] = kalman.whiten(factor, residual[place], whitened[place])
+            residual[a] = fix[VELOCITY, a - 3] - reference.velocity[k, a - 3] - deviation[a]
+        form_innovation(run, place, observation, noise, noise_scale[place], filters, formed, (cross, factor))
 
 
 @njit(cache=True, nogil=True)
@@ -279,67 +309,48 @@ def _put_cross(observation: Floats, row: int, vector: Floats, factor: float) -> 
 
 
 @njit(cache=True, nogil=True)
-def resolve(
-    runs: Runs,
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
-    bias: Floats,
-    covariance: Floats,
-    gain: Floats,
-    whitened: Floats,
-) -> None:
+def correct(runs: Runs, solution: Solution, filters: FilterRuns) -> None:
     """Add the correction -U w, minus the estimated error; P <- P - U U'."""
-    correction = np.empty(NUM_STATES)
+    correction = np.empty(filters.gain.shape[2])
     for run in runs:
         correction[:] = 0.0
-        kalman.correct_error(gain[run], whitened[run], correction)
-        feed_back(correction, attitude[run], velocity[run], position[run], bias[run])
-        kalman.update_covariance(gain[run], covariance[run])
+        kalman.correct_error(filters.gain[run], filters.whitened[run], correction)
+        feed_back(correction, solution_of(run, solution))
+        kalman.update_covariance(filters.gain[run], filters.covariance[run])
 
 
 @njit(cache=True, nogil=True)
-def feed_back(correction: Floats, attitude: Floats, velocity: Floats, position: Floats, bias: Floats) -> None:
-    """Correct the inertial solution of one run by minus its estimated error, (15,) at least; the others in place."""
-    rotate(attitude, -correction[0], -correction[1], -correction[2])
+def feed_back(correction: Floats, solution: Solution) -> None:
+    """Correct the inertial solution of one run, in place, by minus its estimated error, (15,) at least."""
+    rotate(solution.attitude, -correction[0], -correction[1], -correction[2])
     for a in range(3):
-        velocity[a] += correction[3 + a]
-    latitude, longitude, height = enu_displacement(
-        position[0], position[1], position[2], correction[6], correction[7], correction[8]
-    )
-    position[0], position[1], position[2] = latitude, longitude, height
+        solution.velocity[a] += correction[3 + a]
+    _move(solution.position, correction[6], correction[7], correction[8])
     for a in range(6):
-        bias[a] -= correction[9 + a]
+        solution.bias[a] -= correction[9 + a]
+
+
+@njit(cache=True, nogil=True)
+def _move(position: Floats, east: float, north: float, up: float) -> None:
+    """Displace a position (3,), in place, by metres."""
+    latitude, longitude, height = enu_displacement(position[0], position[1], position[2], east, north, up)
+    position[0], position[1], position[2] = latitude, longitude, height
 
 
 @njit(cache=True, nogil=True)
 def reset(
-    runs: Runs,
-    variance: Floats,
-    noise_row: Runs,
-    velocity: Floats,
-    position: Floats,
-    covariance: Floats,
-    measurement_covariance: Floats,
-    residual: Floats,
+    runs: Runs, variance: Floats, noise: FilterNoise, solution: Solution, filters: FilterRuns, residual: Floats
 ) -> None:
     """Move position, and velocity where the fix has one, by the residual (n, m); their correlations are forgotten."""
     for place in range(len(runs)):
         run = runs[place]
+        covariance = filters.covariance[run]
         for a in range(residual.shape[1] - 3):
-            velocity[run, a] -= residual[place, 3 + a]
-            kalman.forget_correlations(3 + a, measurement_covariance[noise_row[run], 3 + a, 3 + a], covariance[run])
-        latitude, longitude, height = enu_displacement(
-            position[run, 0],
-            position[run, 1],
-            position[run, 2],
-            -residual[place, 0],
-            -residual[place, 1],
-            -residual[place, 2],
-        )
-        position[run, 0], position[run, 1], position[run, 2] = latitude, longitude, height
+            solution.velocity[run, a] -= residual[place, 3 + a]
+            kalman.forget_correlations(3 + a, noise.covariance[noise.row[run], 3 + a, 3 + a], covariance)
+        _move(solution.position[run], -residual[place, 0], -residual[place, 1], -residual[place, 2])
         for a in range(3):
-            kalman.forget_correlations(6 + a, variance[place], covariance[run])
+            kalman.forget_correlations(6 + a, variance[place], covariance)
 
 
 @njit(cache=True, nogil=True)

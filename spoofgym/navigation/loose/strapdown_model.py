@@ -12,6 +12,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import displace
 from spoofgym.immutable import Immutable
 from spoofgym.navigation.linear_model import antenna_arm
+from spoofgym.navigation.loose.kernels import FixReference, Samples, StrapdownSteps
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.receiver import Receiver
@@ -86,30 +87,54 @@ class StrapdownModel(Immutable):
         return len(self.time) - 1
 
     @cached_property
-    def parts(self) -> tuple[Runs, Runs]:
-        """The samples of each epoch in parts of about `PART`; one where the epoch is not longer than one and a half.
+    def steps(self) -> StrapdownSteps:
+        """What kernels carry runs with."""
+        bounds, places = _parts(self.step, self.boundaries)
+        return StrapdownSteps(
+            Samples(self.angular_rate, self.specific_force, self.step, self.true_noise),
+            bounds,
+            places,
+            self.latency_samples,
+            self.filter_density,
+            self.instability_sigma,
+            self.instability_decay,
+        )
 
-        Returns:
-            Bounds: samples bounds[p]..bounds[p+1] are part p, (P+1,); and places among them: parts
-            places[k]..places[k+1] lead to epoch k, (K+2,).
-        """
-        ends = np.concatenate([[0.0], np.cumsum(self.step)])
-        number = np.maximum(np.round(np.diff(ends[self.boundaries]) / PART), 1.0).astype(np.int64)
-        if (number == 1).all():
-            return self.boundaries, np.arange(len(self.boundaries))
-        bounds, places = [self.boundaries[:1]], [0]
-        for first, last, parts in zip(self.boundaries[:-1], self.boundaries[1:], number.tolist(), strict=True):
-            cuts = np.linspace(ends[first], ends[last], parts + 1)[1:-1]
-            # the sample that ends nearest to each cut
-            inner = first + np.searchsorted(0.5 * (ends[first:last] + ends[first + 1 : last + 1]), cuts)
-            bounds.append(np.unique([*inner[(inner > first) & (inner < last)], last]))
-            places.append(places[-1] + len(bounds[-1]))
-        return np.concatenate(bounds).astype(np.int64), np.array(places)
+    @cached_property
+    def reference(self) -> FixReference:
+        """What fixes are compared with."""
+        latency = float(self.latency_samples * self.step[0])
+        return FixReference(self.fix_position, self.fix_velocity, self.lever_arm, latency)
 
     @property
     def max_samples(self) -> int:
         """Inertial samples of the longest epoch."""
         return int(np.max(np.diff(self.boundaries)))
+
+
+def _parts(step: Floats, boundaries: Runs) -> tuple[Runs, Runs]:
+    """The samples of each epoch in parts of about `PART`; one where the epoch is not longer than one and a half.
+
+    Args:
+        step: of the samples, (n,), s.
+        boundaries: samples boundaries[k]..boundaries[k+1] lead to epoch k, (K+2,).
+
+    Returns:
+        Bounds: samples bounds[p]..bounds[p+1] are part p, (P+1,); and places among them: parts places[k]..places[k+1]
+        lead to epoch k, (K+2,).
+    """
+    ends = np.concatenate([[0.0], np.cumsum(step)])
+    number = np.maximum(np.round(np.diff(ends[boundaries]) / PART), 1.0).astype(np.int64)
+    if (number == 1).all():
+        return boundaries, np.arange(len(boundaries))
+    bounds, places = [boundaries[:1]], [0]
+    for first, last, parts in zip(boundaries[:-1], boundaries[1:], number.tolist(), strict=True):
+        cuts = np.linspace(ends[first], ends[last], parts + 1)[1:-1]
+        # the sample that ends nearest to each cut
+        inner = first + np.searchsorted(0.5 * (ends[first:last] + ends[first + 1 : last + 1]), cuts)
+        bounds.append(np.unique([*inner[(inner > first) & (inner < last)], last]))
+        places.append(places[-1] + len(bounds[-1]))
+    return np.concatenate(bounds).astype(np.int64), np.array(places)
 
 
 def strapdown_model(

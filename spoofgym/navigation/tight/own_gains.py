@@ -6,9 +6,9 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
+from spoofgym.navigation.batch import NO_DEMANDS
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
 from spoofgym.navigation.packed import pack, packed_size, unpack
 from spoofgym.navigation.position_domain import project_onto_position
 from spoofgym.navigation.tight import kalman as tight_filter

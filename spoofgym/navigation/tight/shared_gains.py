@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
+from spoofgym.navigation.batch import NO_DEMANDS
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.interface import Decision, Demands, Innovation
-from spoofgym.navigation.loose.shared_gains import NO_DEMANDS
 from spoofgym.navigation.tight import kalman as tight_filter
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tight.states import BIAS, CLOCK, INERTIAL, NUM_COMMON, PER_SATELLITE, POSITION, VELOCITY

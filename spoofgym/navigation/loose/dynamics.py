@@ -1,0 +1,158 @@
+"""The true error of N runs in the linear fidelity: what noise and bias instability make of it, epoch by epoch."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from spoofgym.arrays import Floats, Runs
+from spoofgym.kernels import njit
+from spoofgym.navigation import kalman
+from spoofgym.navigation.batch import FilterBatch
+from spoofgym.navigation.error_model import BIAS, INERTIAL, NUM_NAVIGATION, POSITION, VELOCITY
+from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.linear_model import LinearModel, LinearSteps
+from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
+from spoofgym.parallel import RunSlices
+from spoofgym.sensors.imu import ImuGrade
+from spoofgym.streams import RunStreams
+
+
+class ErrorRuns(NamedTuple):
+    """The arrays of `ErrorBatch` that its kernels carry."""
+
+    epoch: Runs
+    state: Floats
+    true_bias: Floats
+    normals: Floats
+    bias_steps: Floats
+
+
+class ErrorBatch(FilterBatch):
+    """N runs of the true error under a linear filter.
+
+    Attributes:
+        model: the game.
+        state: the true error of all states, (N, n).
+        normals: standard normal process noise of the episode, (N, K+1, 9); write into it to inject a noise path.
+        bias_steps: changes of the biases at each epoch, (N, K+1, 6); shape (N, 0, 6) where they are constant.
+        true_bias: gyro and accelerometer biases, (N, 6), rad/s and m/s².
+    """
+
+    def __init__(
+        self,
+        model: LinearModel,
+        grade: ImuGrade,
+        interval: float,
+        num_runs: int,
+        slices: RunSlices,
+        demands: Demands,
+    ) -> None:
+        """Allocate ``num_runs`` runs; `reset` starts them.
+
+        Args:
+            model: of the game.
+            grade: of the IMU: its bias instability acts during the game.
+            interval: between epochs, s.
+            num_runs: N.
+            slices: the threads to use.
+            demands: of the players.
+        """
+        super().__init__(num_runs, model.dimension, slices, demands)
+        epochs = model.num_epochs + 1
+        self.model = model
+        self.state = np.zeros((num_runs, model.num_states))
+        self.normals = np.zeros((num_runs, epochs, NUM_NAVIGATION))
+        unstable = bool(np.any(grade.instability_sigma))
+        self.bias_steps = np.zeros((num_runs, epochs if unstable else 0, 6))
+        self.true_bias = np.zeros((num_runs, 6))
+        self._decay = float(np.exp(-interval / grade.correlation_time))
+        self._instability = grade.instability_sigma
+        self._runs = ErrorRuns(self.index, self.state, self.true_bias, self.normals, self.bias_steps)
+
+    def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
+        """Start new episodes just before epoch 0.
+
+        Args:
+            runs: which, (n,).
+            initial: joint state y drawn for them, (n, 30).
+            streams: the random streams of all runs.
+        """
+        super().reset(runs, initial, streams)
+        self.state[runs] = 0.0
+        self.state[runs, INERTIAL] = initial[:, ERROR]
+        self.true_bias[runs] = initial[:, CONSTANT_BIAS] + initial[:, INSTABILITY]
+        for run in runs.tolist():
+            streams(run, "imu").standard_normal(out=self.normals[run])
+        if self.bias_steps.shape[1]:
+            self._draw_bias_steps(runs, initial[:, INSTABILITY], streams)
+
+    def _draw_bias_steps(self, runs: Runs, value: Floats, streams: RunStreams) -> None:
+        """Draw the Gauss-Markov path of the bias instability; its changes act on the bias error."""
+        driving = self._instability * np.sqrt(1.0 - self._decay**2)
+        normals = np.stack([streams(run, "imu").standard_normal(self.bias_steps.shape[1:]) for run in runs])
+        for k in range(self.bias_steps.shape[1]):
+            following = self._decay * value + driving * normals[:, k]
+            self.bias_steps[runs, k] = following - value
+            value = following
+
+    def _solution(self, runs: Runs) -> tuple[Floats, ...]:
+        return (self.state[runs, INERTIAL],)
+
+    def _moved(self, before: tuple[Floats, ...], after: tuple[Floats, ...]) -> Floats:
+        return before[0] - after[0]
+
+    @property
+    def error(self) -> Floats:
+        """Estimate minus truth, (N, 3), m ENU."""
+        return self.state[:, POSITION].copy()
+
+    @property
+    def velocity_error(self) -> Floats:
+        """Estimate minus truth, (N, 3), m/s ENU."""
+        return self.state[:, VELOCITY].copy()
+
+    @property
+    def estimated_bias(self) -> Floats:
+        """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
+        return self.true_bias - self.state[:, BIAS]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def carry_error(run: int, steps: LinearSteps, errors: ErrorRuns, noise: Floats, work: Floats) -> int:
+    """Carry one run to its next epoch: x <- Φ x + w, and the true bias; returns the epoch.
+
+    ``noise`` (n,) and ``work`` (9,) are overwritten; noise beyond the first fifteen states is left as it is.
+    """
+    errors.epoch[run] += 1
+    k = errors.epoch[run]
+    for i in range(NUM_NAVIGATION):
+        noise[i] = 0.0
+    for j in range(NUM_NAVIGATION):
+        factor = errors.normals[run, k, j]
+        for i in range(NUM_NAVIGATION):
+            noise[i] += steps.noise_columns[k, j, i] * factor
+    if errors.bias_steps.shape[1] > 0:
+        for a in range(6):
+            noise[NUM_NAVIGATION + a] = errors.bias_steps[run, k, a]
+            errors.true_bias[run, a] += errors.bias_steps[run, k, a]
+    kalman.predict_error(steps.transition_columns[k], noise, errors.state[run], work)
+    return k
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def carry_unaided(columns: Floats, auxiliary: Floats, nothing: Floats, work: Floats) -> None:
+    """d <- Φ d of the unaided solution minus the filter's, (15,) or (0,); columns (n, 9), nothing (15,) zeros."""
+    if auxiliary.shape[0] > 0:
+        kalman.predict_error(columns[: auxiliary.shape[0]], nothing, auxiliary, work)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
+    """z = H x - deviation."""
+    for a in range(residual.shape[0]):
+        total = -deviation[a]
+        for j in range(NUM_NAVIGATION):
+            total += observation[a, j] * state[j]
+        residual[a] = total
