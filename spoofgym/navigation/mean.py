@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.error_model import POSITION, VELOCITY
 from spoofgym.parallel import RunSlices
-
-VELOCITY, POSITION = slice(3, 6), slice(6, 9)
 
 
 class Means(NamedTuple):
