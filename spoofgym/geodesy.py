@@ -16,6 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from spoofgym.kernels import njit
 
+AXES = ("east", "north", "up")
+"""Names of the components of a vector."""
+AXIS_LETTERS = "enu"
+"""One letter for each of `AXES`, as specifications spell them."""
 SEMI_MAJOR_AXIS = 6378137.0
 """Equatorial radius a, m (WGS-84)."""
 FLATTENING = 1.0 / 298.257223563
@@ -282,6 +286,12 @@ def enu_to_geodetic(enu: ArrayLike, origin: ArrayLike) -> NDArray[np.float64]:
         ValueError: An argument does not end in three components.
     """
     return _stack(pymap3d.enu2geodetic(*_columns(enu), *_columns(origin), deg=False))
+
+
+def horizontal(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Length of the horizontal part of vectors (..., 3) ENU, (...)."""
+    length: NDArray[np.float64] = np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)
+    return length
 
 
 def ecef_to_enu_rotation(position: ArrayLike) -> NDArray[np.float64]:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import quantile
-from spoofgym.envs.observation import AXES, Field, Squash
+from spoofgym.envs.observation import Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
+from spoofgym.geodesy import AXES
 from spoofgym.kernels import njit
 from spoofgym.responses.onset import OnsetEstimator
 from spoofgym.scenario import Scenario

@@ -16,9 +16,10 @@ from spoofgym.detectors.cpi_theory import kappa
 from spoofgym.envs.actions import rates
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
-from spoofgym.envs.observation import AXES, Field, Squash, observation_space, spoofer_fields
+from spoofgym.envs.observation import Field, Squash, observation_space, spoofer_fields
 from spoofgym.envs.shadow import shadow_filter
 from spoofgym.envs.standing import Standing, horizontal_error
+from spoofgym.geodesy import AXES
 from spoofgym.navigation.interface import RangeNavigator
 from spoofgym.navigation.mean import MeanFilter
 from spoofgym.scenario import Scenario

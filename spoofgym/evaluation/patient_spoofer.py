@@ -20,7 +20,7 @@ from spoofgym.attacks.profiles import EAST, heading
 from spoofgym.command_line import Parser, add_figure, count, seed_number
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import mean_interval
-from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Clock
 from spoofgym.program import program
 from spoofgym.responses import make_response

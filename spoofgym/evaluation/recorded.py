@@ -12,8 +12,7 @@ from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.monte_carlo import horizontal
-from spoofgym.geodesy import position_difference
+from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import interpolate
 from spoofgym.scenarios.clean_run import coasted_positions
 from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
