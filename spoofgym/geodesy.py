@@ -289,7 +289,7 @@ def enu_to_geodetic(enu: ArrayLike, origin: ArrayLike) -> NDArray[np.float64]:
 
 
 def horizontal(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Length of the horizontal part of vectors (..., 3) ENU, (...)."""
+    """Length of the horizontal part, (...), of vectors (..., 2 or more) that begin with east and north."""
     length: NDArray[np.float64] = np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)
     return length
 
