@@ -53,17 +53,6 @@ def ci_threshold(p_fa: float, num_epochs: int, num_measurements: int) -> float:
     return cpi_threshold(p_fa, validation.whole(OWNER, "num_epochs", num_epochs, 1) * num_measurements)
 
 
-def position_information(design: Floats, innovation_covariance: Floats) -> Floats:
-    """σ_s² = u' H' S⁻¹ H u (eq 20), (...), 1/m².
-
-    Args:
-        design: H u, what one metre along u does to the measurements, (..., m), their unit over m.
-        innovation_covariance: S, (..., m, m).
-    """
-    solved = np.linalg.solve(innovation_covariance, design[..., None])[..., 0]
-    return np.add.reduce(design * solved, axis=-1)
-
-
 def kappa(sigma: float, information: Floats | float) -> Floats:
     """κ = σ_t² σ_s²: variance that the tracking error adds to s_k, over that which it has (eqs 24 and 37).
 
@@ -112,19 +101,6 @@ def missed_detection_white(p_fa: float, num_epochs: int, kappa: Floats | float) 
     """
     ratio = 1.0 + validation.non_negatives(OWNER, "kappa", kappa)
     return special.gammainc(0.5 * num_epochs, 0.5 * cpi_threshold(p_fa, num_epochs) / ratio)
-
-
-def missed_detection_gaussian(p_fa: float, num_epochs: int, kappa: Floats | float) -> Floats:
-    """The same for many epochs, where (q - N) / √(2 N) goes from N(0, 1) to N(√(N/2) κ, (1 + κ)²) (eqs 43 to 45).
-
-    It shows how detection grows with N and κ. It is not for numbers: the tails are far off even at hundreds of epochs.
-
-    Raises:
-        ValueError: a value is out of range.
-    """
-    threshold = -special.ndtri(validation.probability(OWNER, "p_fa", p_fa))
-    shift = np.sqrt(0.5 * validation.whole(OWNER, "num_epochs", num_epochs, 1)) * np.asarray(kappa)
-    return special.ndtr((threshold - shift) / (1.0 + np.asarray(kappa)))
 
 
 def missed_detection_coloured(p_fa: float, information: Floats | float, tracking: Floats) -> float:

@@ -181,26 +181,6 @@ def encode(travel: Floats, odometer: Odometer) -> Floats:
     return np.diff(marks, axis=0, prepend=0.0)
 
 
-def encoder_track(travel: Floats, odometer: Odometer, yaw: float) -> tuple[Floats, Floats]:
-    """Dead reckoning by the encoders alone (Song 2021, eq 3).
-
-    The paper prints the whole yaw increment within sine and cosine: the mean direction of a step is its middle's, with
-    half of it.
-
-    Args:
-        travel: of the left and the right wheel in each step, (J, 2), m.
-        odometer: gives the base.
-        yaw: at the start, rad.
-
-    Returns:
-        Position from the start, (J+1, 2), east and north, m, and yaw, (J+1,), rad.
-    """
-    turned = (travel[:, 0] - travel[:, 1]) / odometer.wheel_base
-    heading = yaw + np.concatenate([[0.0], np.cumsum(turned)])
-    steps = step_displacement(travel, heading[:-1] + 0.5 * turned)
-    return np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heading
-
-
 def step_displacement(travel: Floats, yaw: Floats) -> Floats:
     """½ (s_l + s_r) (sin yaw, cos yaw) of each step, (J, 2), m: with the yaw of the INS at its end, Song 2021, eq 4.
 
