@@ -13,6 +13,7 @@ from spoofgym.envs.observation import Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
 from spoofgym.geodesy import AXES
 from spoofgym.kernels import njit
+from spoofgym.navigation.facts import RANGES
 from spoofgym.responses.onset import OnsetEstimator
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -74,7 +75,7 @@ class DefenderFeatures:
     ) -> None:
         """Allocate the memory of ``num_lanes`` lanes, which see the ``detectors`` of these names."""
         self._simulation = simulation
-        ranges = scenario.coupling == "tight"
+        ranges = RANGES in scenario.offers
         dimension = 3 if ranges else scenario.dimension
         self.fields = defender_fields(dimension, tuple(detectors), scenario.defender_scale)
         self._common = len(self.fields)

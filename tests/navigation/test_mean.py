@@ -106,6 +106,6 @@ def test_columns_and_their_transpose_agree_with_the_sequence() -> None:
 
 
 def test_no_offset_makes_every_innovation_of_ranges() -> None:
-    played = make_scenario("kujur-flight:horizon=4,onset=60").mean_filter(1, RunSlices(1))
+    played = make_scenario("kujur-flight:horizon=4,onset=60").family.mean_filter(1, RunSlices(1))
     with pytest.raises(ValueError, match="no offset for every innovation of its ranges"):
         played.offset_for(np.ones(1, dtype=np.int64), np.zeros((1, 3)))

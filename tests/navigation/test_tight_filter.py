@@ -57,11 +57,11 @@ def some_covariance(n, seed):
 @pytest.mark.parametrize("observable", ["carrier", "rate"])
 def test_rows_of_h_are_the_derivatives_of_the_ranges(scenario, observable):
     """Central differences of the distance over 20 m, exact to the fourth power of 10 m / 20 000 km."""
-    geometry, slots = scenario.geometry, scenario.slots
+    geometry, slots = scenario.family.geometry, scenario.slots
     columns, values = observation_columns(slots, observable), observation_values(geometry, observable)
     k = 7
-    time = geometry.time[k] - scenario.start_time
-    truth = scenario.trajectory.position[round(time * scenario.trajectory.rate)]
+    time = geometry.time[k] - scenario.family.start_time
+    truth = scenario.truth.trajectory.position[round(time * scenario.truth.trajectory.rate)]
     present = geometry.present[k]
     for axis in range(3):
         step = 10.0 * np.eye(3)[axis]
@@ -78,8 +78,8 @@ def test_rows_of_h_are_the_derivatives_of_the_ranges(scenario, observable):
 
 
 def test_code_and_carrier_see_the_ionosphere_with_opposite_signs(scenario):
-    dynamics, elevation = scenario.tight_model().dynamics, scenario.geometry.elevation
-    first = round(scenario.onset * scenario.rate) - 1
+    dynamics, elevation = scenario.tight_model().dynamics, scenario.family.geometry.elevation
+    first = round(scenario.truth.onset * scenario.truth.rate) - 1
     matrix, states, slots = dense_observation(dynamics, 0), slot_states(scenario.slots), scenario.slots
     for s in np.flatnonzero(dynamics.present[0]):
         slant, mapping = obliquity(elevation[first, s]), troposphere_mapping(elevation[first, s])
