@@ -1,4 +1,4 @@
-"""An attack as large as the noise in every epoch, so that no epoch stands out."""
+"""An attack whose mean innovation is as large as the noise in every epoch, so that no epoch stands out."""
 
 from __future__ import annotations
 

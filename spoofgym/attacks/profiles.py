@@ -1,4 +1,4 @@
-"""Attacks that follow a profile laid down in advance, blind to the victim."""
+"""Attacks that follow a profile that is fixed in advance. They do not react to the victim."""
 
 from __future__ import annotations
 

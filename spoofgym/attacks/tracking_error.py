@@ -1,4 +1,4 @@
-"""Another attack by a spoofer who knows only roughly where the vehicle is."""
+"""An attack whose spoofer knows only roughly where the vehicle is; it wraps another attack."""
 
 from __future__ import annotations
 

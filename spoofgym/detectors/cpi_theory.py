@@ -1,4 +1,4 @@
-"""What theory says about monitors that sum innovations to see a spoofer's tracking error (Kujur 2024, section 3).
+"""Theory of monitors that sum innovations in order to see a spoofer's tracking error (Kujur 2024, section 3).
 
 The spoofer replays true signals of a place that is off by its tracking error ν_k along the direction u, in metres. With
 γ the innovation of a matched filter, S its covariance and H its design matrix,
@@ -6,10 +6,11 @@ The spoofer replays true signals of a place that is off by its tracking error ν
     cumulative innovation (CI):              Σ γ_k' S_k⁻¹ γ_k,
     cumulative position-domain (CPI):        Σ s_k² / σ_s²,    s_k = u' H' S⁻¹ γ_k,    σ_s² = u' H' S⁻¹ H u,
 
-chi-square without spoofing. σ_s² is the information of one epoch on the position along u, 1/m². Missed detection comes
-three ways: the paper's formula for white tracking error, the paper's for coloured tracking error, and the exact one.
-The paper lets the filter ignore what it is fed; in truth an innovation sees little more than the first difference of
-the tracking error, so that white error is easier to detect than the paper says and coloured error harder.
+Both are chi-square without spoofing. σ_s² is the information of one epoch on the position along u, 1/m². The module has
+three formulas of missed detection: the paper's for white tracking error, the paper's for coloured tracking error, and
+the exact one. The paper neglects that the filter follows the spoofed measurements. In truth an innovation sees little
+more than the first difference of the tracking error. White error is therefore easier to detect than the paper says, and
+coloured error is harder to detect.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The two monitors of Kujur 2024 side by side: long attacks by their tracking error, short ones by separation."""
+"""The two monitors of Kujur 2024 together: one sees long attacks by their tracking error, one sees short attacks."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Solution separation and its protection level (Kujur 2024, section 5 and appendix E).
 
-The filter's position is compared with one that has coasted on inertia since its window was opened,
-d = u'(x_KF - x_coast) along the unit vector u. A position that spoofing has pulled away is still within the protection
-level unless d alarms, however it has been pulled: its error is d, which the threshold bounds, plus the error of the
-coasting, which no signal touches.
+The test compares the filter's position with a position that has coasted on inertia since its window was opened. Their
+separation along the unit vector u is d = u'(x_KF - x_coast). The error of the filter is d plus the error of the
+coasting. The threshold bounds d unless there is an alarm, and no signal can change the error of the coasting. The
+protection level therefore holds under any spoofing until d alarms.
 """
 
 from __future__ import annotations

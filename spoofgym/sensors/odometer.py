@@ -1,6 +1,6 @@
 """A differential-drive odometer with the yaw of an INS: encoders, their errors, and dead reckoning (Song 2021).
 
-Yaw is clockwise from north, as Song's equations have it: east is the sine.
+Yaw is clockwise from north as in Song's equations, so the east component is the sine.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Ranges to satellites: pseudorange, carrier phase and range rate, and the budget of their errors.
 
 Every satellite has five errors of its own (satellite clock and ephemeris, ionosphere, code and carrier multipath, and
-the carrier's ambiguity); the zenith troposphere and the receiver's clock are common to all. The slow ones are
-first-order Gauss-Markov processes, what is left is white (Kujur 2024, appendix A).
+the carrier's ambiguity); the zenith troposphere and the receiver's clock are common to all. The slow errors
+are first-order Gauss-Markov processes, and the other errors are white (Kujur 2024, appendix A).
 """
 
 from __future__ import annotations

@@ -166,7 +166,7 @@ class TightOwnNavigator(TightNavigator):
             raise ValueError("a backtrack is decided, but the navigator keeps no history: demand one when it is built")
         depth = np.minimum(np.minimum(decision.backtrack, self.history), self.index[runs])
         self.backtracked[runs] = depth
-        # the truth has been here before: only the filter goes back
+        # Only the filter is computed again: the true biases of these epochs are history and must not change.
         truth = self.true_bias.copy()
         self._slices.call(
             lambda part: self._carry(part, self.backtracked, self.auxiliary[:, :0], truth), runs[depth > 0], 1
