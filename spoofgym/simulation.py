@@ -16,7 +16,16 @@ from spoofgym.clean_starts import far_too_low, require_clean_starts
 from spoofgym.detectors.base import Detector, statistic_of
 from spoofgym.fitting import fit_attack, fit_detectors, fit_response
 from spoofgym.navigation.divergence import diverged_error
-from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
+from spoofgym.navigation.interface import (
+    NO_DEMANDS,
+    Clock,
+    Decision,
+    Demands,
+    Epoch,
+    FilterView,
+    Innovation,
+    Spoof,
+)
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
@@ -26,7 +35,6 @@ from spoofgym.streams import RunStreams
 OWNER = "Simulation"
 ON_DIVERGENCE = ("raise", "hold")
 MAX_REDRAWS = 100
-NO_DEMANDS = Demands()
 
 
 class Simulation:

@@ -5,6 +5,7 @@ import pytest
 
 from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.navigation import kalman
+from spoofgym.navigation.batch import Weights
 from spoofgym.navigation.tight import kalman as tight_filter
 from spoofgym.navigation.tight.states import (
     CLOCK,
@@ -126,21 +127,11 @@ def test_measurement_update_is_josephs(scenario):
     gain = covariance @ matrix.T @ inverse
     left = np.eye(n) - gain @ matrix
     expected = left @ covariance @ left.T + gain @ noise @ gain.T
-    innovation, response, whitened = np.empty((m, m)), np.empty((m, 3)), np.empty(m)
-    whitened_gain = np.empty((m, n))
-    nis = tight_filter.form_innovation(
-        residual,
-        covariance,
-        dynamics.columns,
-        dynamics.values[3],
-        dynamics.noise_variance[3],
-        innovation,
-        whitened_gain,
-        response,
-        whitened,
-        np.empty((m, n)),
-        np.empty((m, m)),
-    )
+    whitened_gain, formed = np.empty((m, n)), tight_filter.empty_innovations(1, m)
+    formed.residual[0] = residual
+    weights, work = Weights(np.ones(1), np.ones((1, m // 2), dtype=bool)), tight_filter.workspace(dynamics.ranges, n)
+    tight_filter.form_innovation(0, 3, dynamics.ranges, weights, covariance, whitened_gain, formed, work)
+    innovation, response, whitened = formed.covariance[0], formed.response[0], formed.whitened[0]
     corrected = error.copy()
     tight_filter.correct_error(whitened_gain, whitened, corrected)
     tight_filter.update_covariance(whitened_gain, covariance)
@@ -148,7 +139,7 @@ def test_measurement_update_is_josephs(scenario):
     np.testing.assert_allclose(corrected, error - gain @ residual, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(covariance, expected, rtol=1e-8, atol=1e-9)
     np.testing.assert_array_equal(covariance, covariance.T)
-    assert nis == pytest.approx(residual @ inverse @ residual, rel=1e-9)
+    assert formed.nis[0] == pytest.approx(residual @ inverse @ residual, rel=1e-9)
     np.testing.assert_allclose(response.T @ response, matrix[:, 6:9].T @ inverse @ matrix[:, 6:9], rtol=1e-9)
     np.testing.assert_allclose(response.T @ whitened, matrix[:, 6:9].T @ inverse @ residual, rtol=1e-9, atol=1e-12)
 
