@@ -16,16 +16,7 @@ from spoofgym.clean_starts import far_too_low, require_clean_starts
 from spoofgym.detectors.base import Detector, statistic_of
 from spoofgym.fitting import fit_attack, fit_detectors, fit_response
 from spoofgym.navigation.divergence import diverged_error
-from spoofgym.navigation.interface import (
-    NO_DEMANDS,
-    Clock,
-    Decision,
-    Demands,
-    Epoch,
-    FilterView,
-    Innovation,
-    Spoof,
-)
+from spoofgym.navigation.interface import NO_DEMANDS, Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
 from spoofgym.navigation.white import white_epochs
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
