@@ -20,10 +20,11 @@ from typing import Any
 
 from spoofgym.command_line import STDOUT, Parser, add_json, count, learner_seed, run_folder
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig
+from spoofgym.learning import spoofer
+from spoofgym.learning.ppo import Settings
+from spoofgym.learning.run_folder import DEFAULT_STEPS, RunFolder
 from spoofgym.program import do_all, give_json, program
-from train import evaluate, spoofer
-from train.ppo import Settings
-from train.run_folder import DEFAULT_STEPS, RunFolder
+from spoofgym.studies import evaluate
 
 
 @program
@@ -78,7 +79,7 @@ def _train(options: argparse.Namespace, seed: int, path: Path) -> float | None:
     game = {"detector": options.detector, "knowledge": options.knowledge, "action": options.action}
     settings = {**game, "steps": options.steps, "seed": seed}
     command = [part for name, value in settings.items() for part in (f"--{name}", str(value))] + ["--out", str(path)]
-    folder = RunFolder(path, "train.spoofer", SpooferConfig, Settings)
+    folder = RunFolder(path, "spoofgym.learning.spoofer", SpooferConfig, Settings)
     if folder.holds_run:
         run, state = folder.run(), folder.state()
         folder.refuse_changes(run, settings)

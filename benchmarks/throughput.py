@@ -132,7 +132,7 @@ def learner_rate() -> float:
 
     import torch
 
-    from train.ppo import Settings, make_learner
+    from spoofgym.learning.ppo import Settings, make_learner
 
     torch.set_num_threads(2)
     with tempfile.TemporaryDirectory() as folder:

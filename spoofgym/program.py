@@ -80,6 +80,16 @@ def _end_of_start(kind: type[BaseException], error: BaseException, trace: Traceb
     os._exit(INTERRUPTED)  # the interpreter would kill itself by the signal and give another status
 
 
+def moved(new: str) -> int:
+    """Say where a command has gone; returns the exit status.
+
+    Args:
+        new: module that holds it now.
+    """
+    say(f"error: this command has moved: python -m {new}")
+    return USAGE
+
+
 def say(text: str) -> None:
     """One line to stderr, however many the text has."""
     print(" ".join(text.split()), file=sys.stderr, flush=True)

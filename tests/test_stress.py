@@ -92,5 +92,5 @@ def test_a_training_does_not_outlive_an_interrupted_program(tmp_path, monkeypatc
 
     monkeypatch.setattr(subprocess, "Popen", Interrupted)
     with pytest.raises(KeyboardInterrupt):
-        _leg("train.spoofer", tmp_path, 60.0)
+        _leg("spoofgym.learning.spoofer", tmp_path, 60.0)
     assert begun[0].poll() == -signal.SIGKILL

@@ -1,4 +1,4 @@
-"""Programs: ``python -m train.spoofer``, ``python -m train.evaluate``."""
+"""Training programs of a checkout: ``python -m train.spoofer``, ``python -m train.defender``."""
 
 from spoofgym.program import quiet_start
 

@@ -236,5 +236,5 @@ class DefenderEnv(SingleEnv):
 
     def action_masks(self) -> Flags:
         """Which values of the action are open, (M,), as MaskablePPO of sb3-contrib expects."""
-        masks: Flags = self.game.action_masks()[0]
+        masks: Flags = self.game.seat.action_masks()[0]
         return masks

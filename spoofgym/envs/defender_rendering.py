@@ -52,7 +52,7 @@ class DefenderFigure:
         assert epoch.available is not None
         assert epoch.view is not None
         if self._rows:
-            self._decided.append((bool(game.excluding[0]), int(game.simulation.navigator.backtracked[0])))
+            self._decided.append((bool(game.seat.excluding[0]), int(game.simulation.navigator.backtracked[0])))
         covariance = epoch.view.position_covariance[0]
         ratios = [float(epoch.statistics[n][0] / d.threshold) for n, d in game.simulation.detectors.items()]
         self._rows.append(

@@ -41,7 +41,10 @@ class Game(Protocol):
     """N lanes of a game, from one player's seat."""
 
     simulation: Simulation
-    observation_space: spaces.Box
+
+    @property
+    def observation_space(self) -> spaces.Box:
+        """Of one lane."""
 
     @property
     def action_space(self) -> spaces.Space[Any]:

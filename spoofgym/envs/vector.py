@@ -23,6 +23,6 @@ class DefenderVectorEnv(NativeVectorEnv):
     game_type = DefenderGame
 
     def action_masks(self) -> Flags:
-        """Which values of the actions are open to each lane, (N, M), as `DefenderGame.action_masks`."""
-        masks: Flags = self.game.action_masks()
+        """Which values of the actions are open to each lane, (N, M), as `DefenderSeat.action_masks`."""
+        masks: Flags = self.game.seat.action_masks()
         return masks

@@ -1,4 +1,4 @@
-"""How good a player is: Monte Carlo, metrics, reports."""
+"""How good a player is: Monte Carlo, metrics, rows of reports."""
 
 from spoofgym.program import quiet_start
 

@@ -14,7 +14,8 @@ from spoofgym.attacks import opponents
 from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
-from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
+from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.evaluation.monte_carlo import batches, horizontal
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response

@@ -67,7 +67,7 @@ TUNED = {
         ClassicalDefender("tuned-onset", "signed-mean:n=10", "onset-depth:reuse=12", True),
     ],
 }
-"""The best of the grid on 4,000 games of each scenario's training attacks, as ``python -m train.tune`` finds them."""
+"""The best of the grid on 4,000 games of each scenario's training attacks: ``python -m spoofgym.studies.tune``."""
 
 
 def grid() -> list[ClassicalDefender]:

@@ -20,8 +20,9 @@ from spoofgym.calibration.thresholds import Calibration, measure_together
 from spoofgym.command_line import STDOUT, Parser, above_one, add_json, count, seed_number, threads
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector, require_threshold
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import do_all, give_json, program
-from spoofgym.scenario import FIDELITIES, Scenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
 NEEDING_SIMULATION = ("acceleration", "bias-range", "growing-window", "relative-motion")

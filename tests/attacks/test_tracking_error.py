@@ -138,7 +138,7 @@ def test_with_a_correlation_time_the_environments_errors_stay_near_their_neighbo
         errors = []
         for _ in range(120):
             env.step(np.zeros(3))
-            errors.append(env.game.simulation.offset[0] - env.game.offset[0])
+            errors.append(env.game.simulation.offset[0] - env.game.seat.offset[0])
         errors = np.array(errors)
         lag.append(np.mean((errors[1:] - errors[:-1]) ** 2))
     assert lag[0] > 0.8

@@ -7,8 +7,8 @@ import torch
 
 from benchmarks import learning
 from spoofgym.envs.config import SpooferConfig
-from train.ppo import Settings
-from train.run_folder import CHECKPOINT_FILE, Run, RunFolder
+from spoofgym.learning.ppo import Settings
+from spoofgym.learning.run_folder import CHECKPOINT_FILE, Run, RunFolder
 
 GIVEN = ["--seeds", "0", "--steps", "1000", "--json", "-"]
 
@@ -35,7 +35,7 @@ def trainings(tmp_path, monkeypatch):
 
 def begun(tmp_path, finished=None):
     folder = RunFolder(
-        tmp_path / "runs" / "learning" / "snapshot-shadow-rate-0", "train.spoofer", SpooferConfig, Settings
+        tmp_path / "runs" / "learning" / "snapshot-shadow-rate-0", "spoofgym.learning.spoofer", SpooferConfig, Settings
     )
     folder.begin(Run(SpooferConfig(), Settings(), 0, 1000))
     (folder.path / "policy.npz").write_bytes(b"a policy of a run that was stopped")

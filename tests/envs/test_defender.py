@@ -12,7 +12,8 @@ import spoofgym  # noqa: F401 - registers the environment
 from spoofgym.attacks import make_attack
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender import DefenderEnv
-from spoofgym.envs.defender_game import EXCLUDE, USE, DefenderGame
+from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.defender_seat import EXCLUDE, USE
 from spoofgym.envs.vector import DefenderVectorEnv
 from spoofgym.streams import RunStreams
 
@@ -120,7 +121,7 @@ def test_rewards_are_what_the_page_says() -> None:
         env.reset(seed=seed)
         for _ in range(60):
             game = env.game
-            clean = bool(game.clean[0])
+            clean = bool(game.seat.clean[0])
             spoofed, there = bool(game.attacked[0]), bool(game.simulation.epoch.available[0])
             disturbed = bool(game.confounders.multipath[0, game.index[0]])
             assert clean == (there and not spoofed and not disturbed)
@@ -132,8 +133,8 @@ def test_rewards_are_what_the_page_says() -> None:
             assert terms["exclusion"] == (-0.3 if clean and action[0] == EXCLUDE else 0.0)
             assert reward == terms["error"] + terms["exclusion"]
     assert len(kinds) == 4
-    assert make().game._scale == 10.0
-    assert make(scenario="liu-flight:horizon=60").game._scale == 50.0
+    assert make().game.seat._scale == 10.0
+    assert make(scenario="liu-flight:horizon=60").game.seat._scale == 50.0
 
 
 def test_population_confounders_and_noise_do_not_depend_on_what_the_defender_does() -> None:
@@ -197,7 +198,7 @@ def test_observation_holds_what_its_fields_say() -> None:
             assert entry["acceleration"] == pytest.approx(acceleration, rel=2e-3, abs=1e-3)
         sigma = np.sqrt(np.trace(view.position_covariance[0, :2, :2]))
         assert entry["predicted position sigma"] == pytest.approx(sigma, rel=1e-3)
-        assert entry["coasting time"] == pytest.approx(env.game.coast[0], rel=1e-3)
+        assert entry["coasting time"] == pytest.approx(env.game.seat.coast[0], rel=1e-3)
         assert entry["elapsed fraction of the game"] == pytest.approx(k / 60, rel=1e-5)
         action = rng.integers([2, 11])
         observation = env.step(action)[0]
@@ -233,7 +234,7 @@ def test_suspicion_is_that_of_the_classical_defender() -> None:
             excluded += int((~use).sum())
         action = np.stack([~use, np.zeros(lanes)], axis=1).astype(int)
         if k > 10:
-            same = game.features.suspicion == ~use
+            same = game.seat.features.suspicion == ~use
             assert same.mean() > 0.97
         game.step(action)
         simulation.resolve()
@@ -322,14 +323,14 @@ def test_a_sensible_classical_defender_beats_never_always_and_random() -> None:
             )
             vector.reset(seed=0)
             game = vector.game
-            place = int(np.searchsorted(game.depths, depth))
+            place = int(np.searchsorted(game.seat.depths, depth))
             done = np.zeros(GAMES, dtype=bool)
             while not done.all():
                 if name == "random":
-                    action = rng.integers([2, len(game.depths)], size=(GAMES, 2))
+                    action = rng.integers([2, len(game.seat.depths)], size=(GAMES, 2))
                 else:
-                    waiting = game.excluding & (game.features.agreeing < 12)
-                    exclude = {"never": 0, "always": 1, "classical": game.features.suspicion | waiting}[name]
+                    waiting = game.seat.excluding & (game.seat.features.agreeing < 12)
+                    exclude = {"never": 0, "always": 1, "classical": game.seat.features.suspicion | waiting}[name]
                     action = np.stack([exclude * np.ones(GAMES), np.full(GAMES, place)], axis=1).astype(int)
                 *_, terminated, _, info = vector.step(action)
                 done |= terminated

@@ -8,9 +8,9 @@ import pytest
 
 from spoofgym.envs.shadow import shadow_model
 from spoofgym.envs.spoofer import SpooferEnv
-from spoofgym.envs.spoofer_game import INNOVATION_UNIT
+from spoofgym.envs.spoofer_seat import INNOVATION_UNIT
 from spoofgym.optimum import expected_play
-from spoofgym.scenario import SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
 SHORT = "liu-flight:horizon=12"
@@ -18,10 +18,8 @@ WRONG = ["liu-flight:horizon=12,imu=tactical", "liu-flight:horizon=12,sigma=7.4"
 DEAF = "snapshot:threshold=1000"
 
 
-def short_flight() -> SimulatedScenario:
-    scenario = make_scenario(SHORT)
-    assert isinstance(scenario, SimulatedScenario)
-    return scenario
+def short_flight() -> Scenario:
+    return make_scenario(SHORT)
 
 
 def rates(epochs: int) -> np.ndarray:
@@ -36,11 +34,11 @@ def test_means_are_those_of_the_model_that_the_spoofer_believes_in(shadow: str |
     whitened, offsets = [], []
     for action in rates(12):
         env.step(action)
-        whitened.append(env.game.shadow.whitened[0].copy())
-        offsets.append(env.game.offset[0].copy())
+        whitened.append(env.game.seat.shadow.whitened[0].copy())
+        offsets.append(env.game.seat.offset[0].copy())
     play = expected_play(make_scenario(shadow or SHORT).linear_model(), np.array(offsets), 25.9)
     np.testing.assert_allclose(whitened, play.whitened, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(env.game.shadow.mean[0, 6:8], play.final_error, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(env.game.seat.shadow.mean[0, 6:8], play.final_error, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("shadow", WRONG)
@@ -79,7 +77,7 @@ def test_innovation_action_goes_through_the_wrong_filter() -> None:
     believed = make_scenario(WRONG[1]).linear_model().innovation_factor[1]
     change = env.game.simulation.epoch.innovation.whitened[0] - clean.game.simulation.epoch.innovation.whitened[0]
     np.testing.assert_allclose(change, np.linalg.solve(mine, believed @ (INNOVATION_UNIT * wanted)), rtol=1e-9)
-    np.testing.assert_allclose(env.game.shadow.whitened[0], INNOVATION_UNIT * wanted, rtol=1e-9)
+    np.testing.assert_allclose(env.game.seat.shadow.whitened[0], INNOVATION_UNIT * wanted, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -101,11 +99,10 @@ def test_another_timeline_is_refused(shadow: str, message: str) -> None:
 def test_another_dimension_is_refused() -> None:
     flight = short_flight()
     sigma = (0.1, 0.1, 0.1)
-    richer = replace(
-        flight,
+    richer = flight.changed(
         name="with velocity",
-        receiver=replace(flight.receiver, velocity_sigma=sigma),
-        tuning=replace(flight.tuning, measurement_sigma=(*flight.tuning.measurement_sigma, *sigma)),
+        receiver=replace(flight.family.receiver, velocity_sigma=sigma),
+        tuning=replace(flight.family.tuning, measurement_sigma=(*flight.family.tuning.measurement_sigma, *sigma)),
     )
     with pytest.raises(ValueError, match=r"'with velocity' does not fit .*: dimension of the fix: 6 instead of 3"):
         shadow_model(flight, richer)

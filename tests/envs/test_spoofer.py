@@ -16,8 +16,8 @@ from spoofgym.detectors.chi_square import Windowed
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE
 from spoofgym.envs.observation import spoofer_fields
 from spoofgym.envs.spoofer import SpooferEnv
-from spoofgym.envs.spoofer_game import INNOVATION_UNIT
-from spoofgym.scenario import FIDELITIES
+from spoofgym.envs.spoofer_seat import INNOVATION_UNIT
+from spoofgym.navigation.family import FIDELITIES
 
 ID = "spoofgym/Spoofer-v0"
 PREFIXED_ID = f"spoofgym:{ID}"
@@ -271,8 +271,8 @@ def test_tracking_error_changes_what_is_sent_and_seen_but_not_how_it_is_scored()
         np.testing.assert_array_equal(told[:4], seen[:4])  # what it means to send
         assert told[7] == pytest.approx(0.5 / 1.5)
         assert (told[4:7] != seen[4:7]).any()
-        errors.append(rough.game.simulation.offset[0] - rough.game.offset[0])
-        np.testing.assert_array_equal(rough.game.simulation.offset[0] - errors[-1], rough.game.offset[0])
+        errors.append(rough.game.simulation.offset[0] - rough.game.seat.offset[0])
+        np.testing.assert_array_equal(rough.game.simulation.offset[0] - errors[-1], rough.game.seat.offset[0])
     assert np.std(errors) == pytest.approx(0.5, rel=0.15)  # 300 normals: 3.7 sigma
     steps = play(rough, SLOW, seed=6)
     start, final = steps[0][1]["error"], steps[-1][4]
@@ -293,7 +293,7 @@ def test_innovation_action_provokes_the_wanted_mean() -> None:
         # on the same noise the linear fidelity's innovation differs by its mean, exactly
         spoofed, unspoofed = (game.simulation.epoch.innovation.whitened[0] for game in (env.game, clean.game))
         np.testing.assert_allclose(spoofed - unspoofed, INNOVATION_UNIT * wanted, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(env.game.shadow.whitened[0], INNOVATION_UNIT * wanted, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(env.game.seat.shadow.whitened[0], INNOVATION_UNIT * wanted, rtol=1e-9, atol=1e-9)
 
 
 def test_shadow_follows_the_filter_exactly_in_expectation() -> None:
@@ -301,15 +301,15 @@ def test_shadow_follows_the_filter_exactly_in_expectation() -> None:
     env.reset(seed=8)
     clean.reset(seed=8)
     for _ in range(12):
-        coming = env.game.shadow.coming[0].copy()
+        coming = env.game.seat.shadow.coming[0].copy()
         env.step(SLOW)
         clean.step(ZERO)
         change = env.game.simulation.epoch.innovation.whitened - clean.game.simulation.epoch.innovation.whitened
-        np.testing.assert_allclose(env.game.shadow.whitened, change, atol=1e-9)
+        np.testing.assert_allclose(env.game.seat.shadow.whitened, change, atol=1e-9)
         assert (coming != change[0]).any()  # the offset was not held
     # the last fix is used in both
     np.testing.assert_allclose(
-        env.game.shadow.mean[:, 6:9], env.game.simulation.error - clean.game.simulation.error, atol=1e-9
+        env.game.seat.shadow.mean[:, 6:9], env.game.simulation.error - clean.game.simulation.error, atol=1e-9
     )
 
 

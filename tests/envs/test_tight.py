@@ -18,8 +18,8 @@ from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import SpooferVectorEnv
 from spoofgym.navigation.tight.states import POSITION
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.tight_scenario import TightScenario
 
 SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
 KUJUR = "kujur-flight:horizon=40,onset=60"
@@ -29,7 +29,7 @@ DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
 QUIET: dict[str, Any] = {"attacks": "none", "outage": 0.0, "multipath": 0.0}
 
-Under = Callable[[float, float], TightScenario]
+Under = Callable[[float, float], Scenario]
 
 
 # --- both environments ------------------------------------------------------------------------------------------------
@@ -56,7 +56,7 @@ def test_coupling_is_written_into_the_specification(kind: type[Any]) -> None:
     assert argued.game.scenario.name == spelled.game.scenario.name == "liu-flight:horizon=12,coupling=tight"
     np.testing.assert_array_equal(argued.reset(seed=3)[0], spelled.reset(seed=3)[0])
     assert kind(scenario=SHORT, coupling="tight", **given).game.scenario.name == SHORT
-    assert kind(scenario=SHORT, coupling="loose", **given).game.scenario.coupling == "loose"
+    assert kind(scenario=SHORT, coupling="loose", **given).game.scenario.family.coupling == "loose"
     with pytest.raises(ValueError, match=r"'foi-drive' is loosely coupled, not tightly.*: kujur-flight, liu-flight"):
         kind(scenario="foi-drive", coupling="tight", **given)
     with pytest.raises(ValueError, match="tightly coupled, not loosely"):
@@ -88,11 +88,11 @@ def test_four_rates_move_position_and_clock() -> None:
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (4,), np.float32)
     env.reset(seed=0)
     env.step(np.array([0.5, -0.25, 0.1, 1.0]))
-    np.testing.assert_allclose(env.game.offset[0], [1.0, -0.5, 0.2, 2.0])
+    np.testing.assert_allclose(env.game.seat.offset[0], [1.0, -0.5, 0.2, 2.0])
     *_, info = env.step(np.array([0.0, 0.0, 0.0, -7.0]))
-    np.testing.assert_allclose(env.game.offset[0], [1.0, -0.5, 0.2, 0.0], atol=1e-12)
-    assert env.game.simulation.clock_offset[0] == env.game.offset[0, 3]
-    assert info["clock_error"] == pytest.approx(env.game.clock_error[0])
+    np.testing.assert_allclose(env.game.seat.offset[0], [1.0, -0.5, 0.2, 0.0], atol=1e-12)
+    assert env.game.simulation.clock_offset[0] == env.game.seat.offset[0, 3]
+    assert info["clock_error"] == pytest.approx(env.game.seat.clock_error[0])
     for scenario, rate in ((KUJUR, 0.25), (LIU, 0.25), (KUJUR + ",drag_off_rate=4", 4.0)):
         rates = make_scenario(scenario)
         assert (rates.drag_off_rate, rates.clock_rate) == ((rate, rate, rate), rate)
@@ -125,7 +125,7 @@ def test_entries_of_the_spoofer_are_those_of_the_page(knowledge: str, place: int
     seen = env.step(np.array([0.0, 0.0, 0.0, 0.5]))[0]
     assert seen[3] == pytest.approx(1.0 / 11.0)
     if knowledge != "blind":
-        clock = env.game.shadow.clock[0]
+        clock = env.game.seat.shadow.clock[0]
         assert seen[names.index("mean clock error")] == pytest.approx(clock / (10.0 + abs(clock)), rel=1e-6)
         assert clock > 0.3
 
@@ -138,8 +138,8 @@ def test_the_tracking_error_moves_the_position_and_never_the_clock() -> None:
     for _ in range(40):
         vector.step(np.tile([0.1, 0.0, 0.0, 0.2], (50, 1)))
         game = vector.game
-        sent.append(game.simulation.offset - game.offset[:, :3])
-        np.testing.assert_array_equal(game.simulation.clock_offset, game.offset[:, 3])
+        sent.append(game.simulation.offset - game.seat.offset[:, :3])
+        np.testing.assert_array_equal(game.simulation.clock_offset, game.seat.offset[:, 3])
     assert np.std(sent) == pytest.approx(0.5, rel=0.1)
 
 
@@ -151,7 +151,7 @@ def test_kappa_is_that_of_the_model(scenario: str, sigma: float) -> None:
     nothing = np.zeros(env.action_space.shape)
     told = env.step(nothing)[4]["kappa"]
     played = make_scenario(scenario)
-    if played.coupling == "tight":
+    if played.family.coupling == "tight":
         model = played.tight_model()
         dynamics = model.dynamics
         observation = np.zeros((dynamics.dimension, dynamics.num_states))

@@ -1,7 +1,6 @@
 """Defender-v0 on ranges: single satellites that are left out, masks, protection levels."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -12,10 +11,11 @@ import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.arrays import Floats
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender import DefenderEnv
-from spoofgym.envs.defender_game import EXCLUDE, DefenderGame
+from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.defender_seat import EXCLUDE
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
-from spoofgym.tight_scenario import TightScenario
 
 SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
 KUJUR = "kujur-flight:horizon=40,onset=60"
@@ -25,7 +25,7 @@ DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
 QUIET: dict[str, Any] = {"attacks": "none", "outage": 0.0, "multipath": 0.0}
 
-Under = Callable[[float, float], TightScenario]
+Under = Callable[[float, float], Scenario]
 
 
 def defender(lanes: int, seed: int = 5, **arguments: Any) -> DefenderGame:
@@ -78,7 +78,7 @@ def test_a_game_under_few_rising_and_setting_satellites(sky: tuple[float, float]
         np.testing.assert_array_equal(by_slot(game, "satellite in slot"), there)
         np.testing.assert_allclose(entries(game)["satellites in view"], there.sum(axis=1), rtol=1e-5)
         assert not by_slot(game, "code residual of slot")[~there].any()
-        masks = game.action_masks()
+        masks = game.seat.action_masks()
         assert masks.shape == (6, 2 + 5 + 2 * slots)
         assert masks[:, :7].all()
         assert masks[:, 7::2].all()
@@ -101,7 +101,7 @@ def test_an_outage_empties_the_sky() -> None:
         lost += int(out.sum())
         assert not by_slot(game, "satellite in slot")[out].any()
         assert not by_slot(game, "code residual of slot")[out].any()
-        assert not game.action_masks()[out, 8::2].any()
+        assert not game.seat.action_masks()[out, 8::2].any()
         outcome = game.step(leaving(game, 0, 3))
         np.testing.assert_array_equal(outcome.ignored, np.where(out, 2, 0))
         np.testing.assert_array_equal(outcome.left_out, np.where(out, 0, 2))
@@ -187,8 +187,8 @@ def test_unused_satellites_are_no_reason_to_backtrack() -> None:
     action = leaving(game, 0, 1)
     action[:, 1] = 2
     outcome = game.step(action)
-    assert (outcome.backtrack_asked[0], outcome.used[0], game.coast[0]) == (0, True, 0)
-    assert not game.excluding[0]
+    assert (outcome.backtrack_asked[0], outcome.used[0], game.seat.coast[0]) == (0, True, 0)
+    assert not game.seat.excluding[0]
     action[:, 0] = EXCLUDE
     assert game.step(action).backtrack_asked[0] == 10
 
@@ -239,7 +239,7 @@ def test_code_residuals_are_standard_normal_in_a_clean_game() -> None:
 def test_protection_levels_are_those_of_filter_and_detectors() -> None:
     """Over the alert limits of the scenario: up for a bank of heights, horizontal for the others."""
     detectors = ("snapshot", "separation-bank:n=30", "separation-bank:n=30,direction=horizontal", "kujur-monitor:n=30")
-    scenario = replace(make_scenario(KUJUR), name="narrow", alert_limits=(80.0, 40.0))  # type: ignore[type-var]
+    scenario = make_scenario(KUJUR).changed(name="narrow", alert_limits=(80.0, 40.0))
     game = defender(3, scenario=scenario, detectors=detectors, attacks="ramp:2", clean=0.0)
     running = list(game.simulation.detectors.values())
     limits = {running[1].name: 40.0, running[2].name: 80.0, running[3].name: 40.0}

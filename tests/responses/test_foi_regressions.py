@@ -10,8 +10,8 @@ import functools
 import numpy as np
 import pytest
 
-from spoofgym.evaluation.reproduce.foi_games import Figures, Games, figures
-from spoofgym.evaluation.reproduce.foi_tables import ATTACKS, SETTINGS
+from spoofgym.studies.reproduce.foi_games import Figures, Games, figures
+from spoofgym.studies.reproduce.foi_tables import ATTACKS, SETTINGS
 
 RUNS = 12
 K20_BACK_20, K5_BACK_20, K20_BACK_0, K5_BACK_10 = 5, 6, 7, 9

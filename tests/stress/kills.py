@@ -16,18 +16,18 @@ import numpy as np
 import torch
 
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
+from spoofgym.learning import defender_ppo, ppo
+from spoofgym.learning.run_folder import CHECKPOINT_FILE, Run, RunFolder
 from spoofgym.policies.learned import CONFIG_FILE
-from train import defender_ppo, ppo
-from train.run_folder import CHECKPOINT_FILE, Run, RunFolder
 
 RUNS = {
-    "train.spoofer": Run(
+    "spoofgym.learning.spoofer": Run(
         SpooferConfig(scenario="liu-flight:horizon=12", detector="windowed:n=5,threshold=45"),
         ppo.Settings(lanes=4, trials=2, epochs=2, hidden=8),
         3,
         1200,
     ),
-    "train.defender": Run(
+    "spoofgym.learning.defender": Run(
         DefenderConfig(scenario="foi-drive:horizon=40", detectors=("snapshot",)),
         defender_ppo.Settings(lanes=3, epochs=2, hidden=8, imitate=False, validation_episodes=6),
         4,
@@ -35,8 +35,8 @@ RUNS = {
     ),
 }
 TYPES = {
-    "train.spoofer": (SpooferConfig, ppo.Settings),
-    "train.defender": (DefenderConfig, defender_ppo.Settings),
+    "spoofgym.learning.spoofer": (SpooferConfig, ppo.Settings),
+    "spoofgym.learning.defender": (DefenderConfig, defender_ppo.Settings),
 }
 MOST_KILLS = 6
 """Of one training; then it may come to its end."""

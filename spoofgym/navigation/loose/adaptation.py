@@ -38,7 +38,7 @@ class Adaptation:
 
     ``guard`` is one of these, or several joined by ``+``. Without any the recursion is the published one, and a filter
     that meets α < 0 raises `NegativeRatioError`. Every guard survives α ≤ 0: where it does not clip α it keeps Q. The
-    figures are those of `spoofgym.evaluation.self_tuning`, w = 50, white noise with the filter's R or correlated noise.
+    figures are those of `spoofgym.studies.self_tuning`, w = 50, white noise with the filter's R or correlated noise.
 
     - ``none``: as published. Ends in 100 % of the runs by 20 s under correlated noise.
     - ``hold``: keeps Q where α ≤ 0, nothing else. Q is 1300 times too large at 20 s of white noise.

@@ -1,0 +1,161 @@
+"""All attackers of one game, evaluated on the same noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from spoofgym.arrays import Floats
+from spoofgym.attacks.base import Attack
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.envs.trained import spoofer_config
+from spoofgym.evaluation.metrics import attacker_score, undetected_error
+from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
+from spoofgym.evaluation.report import attacker_row
+from spoofgym.evaluation.trained_on import tell_what_is_new
+from spoofgym.optimum import expected_play
+from spoofgym.policies.baselines import Baseline, known_baselines, searched_baselines
+from spoofgym.policies.learned import LearnedSpoofer
+from spoofgym.scenario import Scenario
+from spoofgym.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What every attacker is evaluated on.
+
+    Attributes:
+        scenario: of the game.
+        detector_names: their specifications.
+        detectors: with their thresholds.
+        fidelity: of the simulation.
+        episodes: games of each attacker.
+        seed: of game 0.
+        threads: of the simulation.
+        threshold: of the snapshot test where exact values exist, else None.
+    """
+
+    scenario: Scenario
+    detector_names: tuple[str, ...]
+    detectors: list[Detector]
+    fidelity: str
+    episodes: int
+    seed: int
+    threads: int
+    threshold: float | None
+
+    def rows(self, policies: list[LearnedSpoofer], attacks: list[Attack], console: Console) -> list[dict[str, Any]]:
+        """Rows of the baselines, of scripted attacks and of policies, in this order."""
+        self.check_layouts(policies)
+        self.check_attacks(attacks)
+        with console.status("baselines"):
+            baselines = self._baselines()
+        optimum = next((baseline.exact for baseline in baselines if baseline.name == "optimum"), None)
+        rows = []
+        for baseline in baselines:
+            rows.append(self._row(baseline, optimum, console))
+        for attack in attacks:
+            rows.append(self._row(Baseline(attack.name, "blind", attack, None), optimum, console))
+        for policy in policies:
+            with console.status(policy.name):
+                score = attacker_score(self.play_policy(policy))
+                exact = self.exact(policy)
+            rows.append(attacker_row(policy.name, spoofer_config(policy).knowledge, score, exact, optimum))
+        return rows
+
+    def check_attacks(self, attacks: list[Attack]) -> None:
+        """Refuse attacks that do not fit the game, before anything is played.
+
+        Raises:
+            ValueError: what `Simulation` refuses.
+        """
+        for attack in attacks:
+            Simulation(self.scenario, deepcopy(attack), self.detectors, fidelity=self.fidelity)
+
+    def check_layouts(self, policies: list[LearnedSpoofer]) -> None:
+        """Refuse policies that were trained for another observation, and tell which play something else.
+
+        Raises:
+            ValueError: naming the policy and the first entry that differs, or what cannot be built of its game.
+        """
+        for policy in policies:
+            try:
+                fields = self._game(policy, 1).fields
+            except ValueError as error:
+                raise ValueError(f"policy {policy.name!r}: {error}") from error
+            policy.check_layout([field.name for field in fields])
+        tell_what_is_new(policies, self.scenario, self.fidelity, self.detectors)
+
+    def _baselines(self) -> list[Baseline]:
+        if self.threshold is not None:
+            return known_baselines(self.scenario, self.threshold)
+        return searched_baselines(self.scenario, self._mean_score)
+
+    def _row(self, baseline: Baseline, optimum: float | None, console: Console) -> dict[str, Any]:
+        score = None
+        if baseline.attack is not None:
+            with console.status(baseline.name):
+                score = attacker_score(self.play(baseline.attack, self.episodes))
+        return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
+
+    def _mean_score(self, attack: Attack, episodes: int) -> float:
+        """Mean undetected error of an attack, m."""
+        return float(np.mean(undetected_error(self.play(attack, episodes))))
+
+    def play(self, attack: Attack, episodes: int) -> Episodes:
+        """Games of an attack."""
+        return play_attack(
+            self.scenario,
+            attack,
+            self.detectors,
+            episodes,
+            self.seed,
+            fidelity=self.fidelity,
+            threads=self.threads,
+        )
+
+    def _game(self, policy: LearnedSpoofer, lanes: int) -> SpooferGame:
+        """The evaluated game as this policy sees it: its own knowledge, action, memory and shadow filter."""
+        config = replace(
+            spoofer_config(policy),
+            scenario=self.scenario,
+            detector=tuple(self.detectors),
+            fidelity=self.fidelity,
+            threads=self.threads,
+        )
+        return SpooferGame(config, lanes)
+
+    def play_policy(self, policy: LearnedSpoofer) -> Episodes:
+        """Games of a policy."""
+
+        def make(lanes: int) -> SpooferGame:
+            return self._game(policy, lanes)
+
+        return play_policy(make, policy.act, self.episodes, self.seed)
+
+    def exact(self, policy: LearnedSpoofer) -> float | None:
+        """Exact undetected error of a policy whose offsets do not depend on chance, m; else None.
+
+        The policy may choose them by the shadow filter of another model: what they are worth is the victim's to say.
+        """
+        config = spoofer_config(policy)
+        if self.threshold is None or config.knowledge == "full" or config.tracking_sigma:
+            return None
+        offsets = offsets_without_chance(self._game(policy, 1), policy.act)
+        return float(expected_play(self.scenario.linear_model(), offsets, self.threshold).score)
+
+
+def offsets_without_chance(game: SpooferGame, act: Callable[[Any], Any]) -> Floats:
+    """The offsets that a policy sends in a game of one lane, (K, 3), m ENU."""
+    game.reset(np.zeros(1, dtype=np.int64))
+    offsets = []
+    for _ in range(game.scenario.timeline.num_epochs):
+        game.step(act(game.observation()))
+        offsets.append(game.seat.offset[0].copy())
+    return np.array(offsets)

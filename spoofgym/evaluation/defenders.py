@@ -1,0 +1,311 @@
+"""All defenders of one game, evaluated on the same episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from spoofgym.calibration import calibrated_all
+from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.trained import defender_config
+from spoofgym.evaluation.defence import (
+    DefenceEpisodes,
+    World,
+    play_always,
+    play_never,
+    play_oracle_onset,
+    play_policy,
+    play_random,
+    play_response,
+)
+from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, difference, paired_difference
+from spoofgym.evaluation.report import defenders_report
+from spoofgym.evaluation.trained_on import tell_what_is_new
+from spoofgym.policies.classical import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
+from spoofgym.policies.learned import LearnedDefender
+from spoofgym.responses import make_response
+from spoofgym.scenario import Scenario
+
+POPULATIONS = {"training": False, "held-out": True}
+"""Populations of attacks, and whether a defender never sees them in training."""
+ORACLE_DEPTH = "oracle-depth"
+LEARNED_MEAN = "mean of the learned"
+"""Stands for all learned defenders of a comparison: their mean error in each game."""
+
+
+def fits(detector: str, scenario: Scenario) -> bool:
+    """Whether a scenario offers what the detector of a specification needs."""
+    return set(make_detector(detector).needs) <= set(scenario.offers)
+
+
+def listed_for(scenario: Scenario, listed: Sequence[ClassicalDefender], console: Console) -> list[ClassicalDefender]:
+    """Those of the defenders that are always played whose detectors fit the scenario; the console names the others."""
+    left_out = [item for item in listed if not fits(item.detector, scenario)]
+    if left_out:
+        names = ", ".join(f"{item.name} ({item.detector})" for item in left_out)
+        text = f"left out, as scenario {scenario.name} does not give what they need: {names}"
+        console.print(text, markup=False, soft_wrap=True)
+    return [item for item in listed if item not in left_out]
+
+
+def world_of(
+    scenario: Scenario,
+    attacks: str,
+    fidelity: str,
+    threads: int,
+    policies: Sequence[LearnedDefender],
+    classical: Sequence[ClassicalDefender],
+) -> World:
+    """The world of an evaluation: half of the games are clean.
+
+    Of `WORLD_DETECTORS` those run that fit the scenario.
+
+    Raises:
+        ValueError: a detector cannot be built, or one that a policy or a defender watches does not fit the scenario.
+    """
+    common = [name for name in WORLD_DETECTORS if fits(name, scenario)]
+    wanted = [str(part) for policy in policies for part in _watched(policy)]
+    names = dict.fromkeys([*common, *wanted, *(item.detector for item in classical)])
+    built = {detector.name: detector for detector in map(make_detector, names)}
+    detectors = tuple(calibrated_all(list(built.values()), scenario))
+    return World(scenario, attacks, 0.5, detectors, fidelity=fidelity, threads=threads)
+
+
+def _watched(policy: LearnedDefender) -> tuple[str | Detector, ...]:
+    """The detectors whose statistics a policy sees."""
+    detectors = defender_config(policy).detectors
+    return detectors if isinstance(detectors, tuple) else (detectors,)
+
+
+def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
+    """Refuse policies that do not fit the game.
+
+    Raises:
+        ValueError: a policy was trained on another observation, or on another number of depths.
+    """
+    for policy in policies:
+        config = replace(defender_config(policy), scenario=world.scenario, fidelity=world.fidelity)
+        game = DefenderGame(config, 1, world.detectors)
+        policy.check_layout([field.name for field in game.fields])
+        if policy.depths != len(game.seat.depths):
+            raise ValueError(
+                f"policy {policy.name!r} was trained on {policy.depths} depths, the game has {len(game.seat.depths)}"
+            )
+
+
+@dataclass(frozen=True)
+class Played:
+    """A defender and what came of its games.
+
+    Attributes:
+        name: of the defender.
+        kind: "learned", "tuned", "published", "yardstick" or "given".
+        episodes: its games.
+    """
+
+    name: str
+    kind: str
+    episodes: DefenceEpisodes
+
+
+class Defenders:
+    """Plays every defender in a world."""
+
+    def __init__(self, world: World, episodes: int, seed: int, console: Console) -> None:
+        """Play ``episodes`` games each, the first of which is seeded ``seed``."""
+        self._world, self._episodes, self._seed, self._console = world, episodes, seed, console
+
+    def play(
+        self,
+        published: Sequence[ClassicalDefender],
+        tuned: Sequence[ClassicalDefender],
+        given: Sequence[ClassicalDefender],
+        policies: Sequence[LearnedDefender],
+    ) -> Iterator[Played]:
+        """All games of all defenders, one defender after the other."""
+        world, episodes, seed = self._world, self._episodes, self._seed
+        yardsticks: dict[str, Callable[[], DefenceEpisodes]] = {
+            "never": lambda: play_never(world, episodes, seed),
+            "always": lambda: play_always(world, episodes, seed),
+            "random": lambda: play_random(world, episodes, seed),
+        }
+        for name, play in yardsticks.items():
+            yield self._played(name, "yardstick", play)
+        for kind, classical in (("published", published), ("tuned", tuned), ("given", given)):
+            for defender in classical:
+                yield self._played(defender.name, kind, partial(self._classical, defender))
+        yield self._played("oracle-onset", "yardstick", lambda: play_oracle_onset(world, episodes, seed))
+        best = next((item for item in tuned if "onset" not in item.response), None)
+        if best is not None:
+            yield self._played(ORACLE_DEPTH, "yardstick", lambda: self.oracle_depth(best))
+        for policy in policies:
+            games = partial(play_policy, world, defender_config(policy), policy.act, episodes, seed)
+            yield self._played(policy.name, "learned", games)
+
+    def _played(self, name: str, kind: str, games: Callable[[], DefenceEpisodes]) -> Played:
+        with self._console.status(f"{self._world.attacks}: {name}"):
+            return Played(name, kind, games())
+
+    def _classical(self, defender: ClassicalDefender) -> DefenceEpisodes:
+        name = make_detector(defender.detector).name
+        return play_response(self._world, name, make_response(defender.response), self._episodes, self._seed)
+
+    def oracle_depth(self, defender: ClassicalDefender) -> DefenceEpisodes:
+        """The games of a backtracking defender, each with the depth that turned out best in it."""
+        _, _, options = defender.response.partition("," if "backtrack" in defender.response else ":")
+        best: DefenceEpisodes | None = None
+        for depth in self._world.scenario.depth_table:
+            games = self._classical(replace(defender, response=with_depth(depth, options)))
+            best = games if best is None else _better(best, games)
+        assert best is not None
+        return best
+
+
+def _better(one: DefenceEpisodes, other: DefenceEpisodes) -> DefenceEpisodes:
+    """Of each game that one of the two in which the mean error is less."""
+    less = other.error.mean(axis=1) < one.error.mean(axis=1)
+    return replace(
+        one,
+        error=np.where(less[:, None], other.error, one.error),
+        excluded=np.where(less[:, None], other.excluded, one.excluded),
+    )
+
+
+def rows(played: Played, held_out: bool) -> list[dict[str, Any]]:
+    """The rows of one defender: each attack by itself, games without one, and all games pooled."""
+    episodes = played.episodes
+    pooled = "all-held-out" if held_out else "all-training"
+    parts = [(pooled, np.ones(len(episodes.member), dtype=bool)), ("none", episodes.member < 0)]
+    parts += [(name, episodes.member == place) for place, name in enumerate(episodes.names)]
+    return [
+        _row(played.name, attack, held_out, defender_score(episodes.of(games)))
+        for attack, games in parts
+        if games.any()
+    ]
+
+
+def _row(defender: str, attack: str, held_out: bool, score: DefenderScore) -> dict[str, Any]:
+    return {
+        "defender": defender,
+        "attack": attack,
+        "held_out": held_out,
+        "episodes": score.episodes,
+        "mean_error_m": score.mean_error,
+        "ci95_m": list(score.interval),
+        "rmse_m": score.rmse,
+        "max_error_m": score.max_error,
+        "detection_probability": score.detection_probability,
+        "median_time_to_detect_s": score.median_time_to_detect,
+        "error_at_detection_m": score.error_at_detection,
+        "median_time_to_reuse_s": score.median_time_to_reuse,
+        "never_reused_fraction": score.never_reused,
+        "clean_exclusion_fraction": score.clean_exclusion,
+        "false_alarms_per_epoch": score.false_alarms,
+    }
+
+
+def comparisons(learned: Sequence[Played], others: Sequence[Played], held_out: bool) -> list[dict[str, Any]]:
+    """Mean error of each learned defender, and of all of them averaged, minus that of every other on the same games."""
+    result = []
+    for other in others:
+        mean = np.mean([one.episodes.error.mean(axis=1) for one in learned], axis=0)
+        pairs = [(one.name, paired_difference(one.episodes, other.episodes)) for one in learned]
+        if len(learned) > 1:
+            pairs.append((LEARNED_MEAN, difference(mean, other.episodes.error.mean(axis=1))))
+        for name, found in pairs:
+            result.append(
+                {
+                    "defender": name,
+                    "baseline": other.name,
+                    "kind": other.kind,
+                    "held_out": held_out,
+                    "difference_m": found.mean,
+                    "ci95_m": list(found.interval),
+                }
+            )
+    return result
+
+
+def closed_gap(learned: float, best_classical: float, oracle: float) -> float | None:
+    """Share of the gap from the best tuned defender to `oracle-depth` that a defender closes; None if there is none."""
+    gap = best_classical - oracle
+    return (best_classical - learned) / gap if gap > 0 else None
+
+
+def evaluate_defenders(
+    scenario: Scenario,
+    fidelity: str,
+    policies: Sequence[LearnedDefender],
+    given: Sequence[ClassicalDefender],
+    populations: Sequence[str],
+    episodes: int,
+    seed: int,
+    threads: int,
+    console: Console,
+) -> dict[str, Any]:
+    """The ``"defenders"`` report: every defender against every population.
+
+    Args:
+        scenario: of the games.
+        fidelity: of the simulation.
+        policies: learned defenders.
+        given: classical ones beside those that are always played.
+        populations: names of `POPULATIONS`.
+        episodes: games per population and defender.
+        seed: of game 0.
+        threads: of the simulation.
+        console: where the progress is shown.
+
+    Raises:
+        ValueError: two policies of one name, one that was trained on another observation, or one or a given defender
+            whose detector does not fit the scenario.
+    """
+    names = [policy.name for policy in policies]
+    if len(set(names)) < len(names):
+        raise ValueError(f"run folders of one name cannot be told apart: {', '.join(names)}")
+    tell_what_is_new(policies, scenario, fidelity)
+    published = listed_for(scenario, PUBLISHED, console)
+    tuned = listed_for(scenario, tuned_for(scenario.name), console)
+    kinds: dict[str, str] = {}
+    report_rows, pairs, gaps = [], [], []
+    for population in populations:
+        held_out = POPULATIONS[population]
+        with console.status("thresholds of the detectors"):
+            world = world_of(scenario, population, fidelity, threads, policies, given)
+        check_policies(world, policies)
+        played = list(Defenders(world, episodes, seed, console).play(published, tuned, given, policies))
+        learned = [item for item in played if item.kind == "learned"]
+        for item in played:
+            kinds[item.name] = item.kind
+            report_rows += rows(item, held_out)
+        if learned:
+            pairs += comparisons(learned, [item for item in played if item.kind != "learned"], held_out)
+        gaps += _gaps(played, held_out)
+    return defenders_report(scenario, fidelity, kinds, report_rows, pairs, gaps)
+
+
+def _gaps(played: Sequence[Played], held_out: bool) -> list[dict[str, Any]]:
+    """Shares of the gap between the best tuned defender of a fixed depth and `oracle-depth`."""
+    means = {item.name: float(item.episodes.error.mean()) for item in played}
+    tuned = [item.name for item in played if item.kind == "tuned"]
+    if not tuned or ORACLE_DEPTH not in means:
+        return []
+    best = tuned[0]
+    compared = [item.name for item in played if item.kind in ("learned", "given")] + tuned[1:]
+    return [
+        {
+            "defender": name,
+            "held_out": held_out,
+            "from": best,
+            "to": ORACLE_DEPTH,
+            "closed": closed_gap(means[name], means[best], means[ORACLE_DEPTH]),
+        }
+        for name in compared
+    ]

@@ -1,0 +1,189 @@
+"""Every detector against every attack, at an equal false-alarm rate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rich.console import Console
+
+from spoofgym.attacks import make_attack
+from spoofgym.attacks.base import Attack
+from spoofgym.calibration import calibrated_all
+from spoofgym.detectors import at_arl0, make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.envs.trained import spoofer_config
+from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
+from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack, watch_policy
+from spoofgym.evaluation.trained_on import tell_what_is_new
+from spoofgym.policies.learned import LearnedSpoofer
+from spoofgym.policies.optimal import ORACLES, oracles
+from spoofgym.scenario import Scenario
+
+DETECTORS = (
+    "snapshot",
+    "px4-gate",
+    "ardupilot-gate",
+    "rio",
+    "acna",
+    *(f"windowed:n={n}" for n in (10, 30, 60, 120)),
+    "window-bank",
+    "cusum",
+    "fma",
+    *(f"signed-mean:n={n}" for n in (10, 30, 60, 120)),
+    "mean-innovation:n=30",
+    "aime",
+    "signed-cusum",
+    "ewma",
+    "mewma",
+    "ramp-bank",
+    "solution-separation:n=30",
+    "whiteness",
+    "relative-motion",
+    "acceleration",
+    "bias-range",
+    "ensemble",
+)
+ATTACKS = (
+    "jump",
+    "ramp:0.1",
+    "ramp:0.2",
+    "ramp:0.3",
+    "ramp:0.5",
+    "ramp:2",
+    "jump-ramp:0.1,jump=5",
+    "slow-change:mean=0.1,variance=0.01",
+    "exponential:0.02,time=30",
+    "fusion-ripper:2,f=1.02",
+    "meaconing:0.02",
+    "circle:15",
+    "azimuth:0.1",
+    "noise-matched:level=0.5",
+    "tracking-error:ramp:0.2,sigma=1,time=20",
+)
+"""On the Liu flight the smaller of them tell detectors apart; any detector sees the larger ones."""
+CLEAN = "none"
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """What every attack meets.
+
+    Attributes:
+        scenario: of the games.
+        fidelity: of the simulation.
+        arl0: of every detector that has one, epochs.
+        episodes: of each attack.
+        seed: of game 0.
+        threads: of the simulation.
+    """
+
+    scenario: Scenario
+    fidelity: str
+    arl0: float
+    episodes: int
+    seed: int
+    threads: int
+
+    def report(
+        self,
+        detectors: Sequence[str],
+        attacks: Sequence[str],
+        policies: Sequence[LearnedSpoofer],
+        console: Console,
+    ) -> dict[str, Any]:
+        """The whole ``"matrix"`` report.
+
+        Args:
+            detectors: specifications; none = `DETECTORS`.
+            attacks: specifications, or names of `ORACLES`; none = `ATTACKS` and all oracles.
+            policies: learned spoofers.
+            console: for the progress.
+
+        Raises:
+            ValueError: a part that is unknown or does not fit the scenario, or a policy that sees its detector's
+                statistics.
+        """
+        for policy in policies:
+            if spoofer_config(policy).knowledge == "full":
+                raise ValueError(
+                    f"policy {policy.name!r} sees the statistics of its own detector (knowledge 'full'): the matrix "
+                    "takes policies that know less, 'blind' or 'shadow'"
+                )
+        tell_what_is_new(policies, self.scenario, self.fidelity)
+        with console.status("attacks"):
+            scripted = self._attacks(attacks)
+        with console.status("thresholds"):
+            ready = self._detectors(detectors or DETECTORS)
+        clean = self._play(make_attack(CLEAN), ready, console)
+        rows, curves = matrix_rows(ready, CLEAN, clean), []
+        for name, games in self._games(scripted, policies, ready, console):
+            rows += matrix_rows(ready, name, games)
+            curves += detection_curves(ready, clean, name, games)
+        return matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
+
+    def names(self, attacks: Sequence[str], policies: Sequence[LearnedSpoofer]) -> list[str]:
+        """Of the attacks that `report` plays with these arguments, the clean games left out."""
+        return [attack.name for attack in self._attacks(attacks)] + [policy.name for policy in policies]
+
+    def _attacks(self, given: Sequence[str]) -> list[Attack]:
+        asked = given or (*ATTACKS, *ORACLES)
+        known: dict[str, Attack] = {}
+        if any(text in ORACLES for text in asked):
+            known = {attack.name: attack for attack in oracles(self.scenario, self.arl0)}
+        lacking = [text for text in given if text in ORACLES and text not in known]
+        if lacking:
+            raise ValueError(
+                f"attack {lacking[0]!r} needs a matched filter and fixes without velocity, scenario "
+                f"{self.scenario.name!r} has not both"
+            )
+        return [known.get(text) or make_attack(text) for text in asked if text in known or text not in ORACLES]
+
+    def _detectors(self, given: Sequence[str]) -> list[Detector]:
+        detectors = [make_detector(at_arl0(text, self.arl0)) for text in given]
+        names = [detector.name for detector in detectors]
+        if len(set(names)) < len(names):
+            raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
+        return calibrated_all(detectors, self.scenario, self.fidelity)
+
+    def _games(
+        self,
+        attacks: Sequence[Attack],
+        policies: Sequence[LearnedSpoofer],
+        detectors: list[Detector],
+        console: Console,
+    ) -> list[tuple[str, WatchedEpisodes]]:
+        games = [(attack.name, self._play(attack, detectors, console)) for attack in attacks]
+        for policy in policies:
+            with console.status(policy.name):
+                games.append((policy.name, self._play_policy(policy, detectors)))
+        return games
+
+    def _play(self, attack: Attack, detectors: list[Detector], console: Console) -> WatchedEpisodes:
+        with console.status(attack.name):
+            return watch_attack(
+                self.scenario,
+                attack,
+                detectors,
+                self.episodes,
+                self.seed,
+                fidelity=self.fidelity,
+                threads=self.threads,
+            )
+
+    def _play_policy(self, policy: LearnedSpoofer, detectors: list[Detector]) -> WatchedEpisodes:
+        def make(lanes: int) -> SpooferGame:
+            config = replace(
+                spoofer_config(policy),
+                scenario=self.scenario,
+                detector=tuple(detectors),
+                fidelity=self.fidelity,
+                threads=self.threads,
+            )
+            game = SpooferGame(config, lanes)
+            policy.check_layout([field.name for field in game.fields])
+            return game
+
+        return watch_policy(make, policy.act, self.episodes, self.seed)

@@ -1,0 +1,8 @@
+"""This command has moved to `spoofgym.studies.reproduce`."""
+
+import sys
+
+from spoofgym.program import moved
+
+if __name__ == "__main__":
+    sys.exit(moved("spoofgym.studies.reproduce"))

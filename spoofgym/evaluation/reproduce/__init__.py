@@ -1,1 +1,0 @@
-"""Published figures beside our own, a row for each: ``python -m spoofgym.evaluation.reproduce PAPER``."""

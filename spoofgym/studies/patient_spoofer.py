@@ -1,0 +1,191 @@
+"""What a reset is worth to a patient spoofer: it jumps beyond the gate, waits until the filter gives in, and drags off.
+
+``python -m spoofgym.studies.patient_spoofer`` prints a table of responses, and draws the figure of the page on
+responses with ``--figure FILE``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from spoofgym import files, validation
+from spoofgym.arrays import Floats
+from spoofgym.attacks.base import Attack
+from spoofgym.attacks.profiles import EAST, heading
+from spoofgym.command_line import Parser, add_figure, count, seed_number
+from spoofgym.detectors import make_detector
+from spoofgym.evaluation.metrics import mean_interval
+from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.navigation.interface import Clock
+from spoofgym.program import program
+from spoofgym.responses import make_response
+from spoofgym.scenarios import make_scenario
+from spoofgym.simulation import Simulation
+from spoofgym.specification import spell
+
+SCENARIO = "liu-flight:horizon=150,imu=tactical"
+DETECTOR = "snapshot"
+ONSET = 820.0
+JUMP, PATIENCE, RATE = 100.0, 10.0, 3.0
+RESPONSES = (
+    "px4-auto",
+    "ardupilot-glitch",
+    "ardupilot-clip",
+    "px4-dead-reckoning",
+    "exclude-and-backtrack:20",
+    "onset-depth",
+)
+DRAWN = ("px4-auto", "ardupilot-clip", "px4-dead-reckoning", "exclude-and-backtrack:20")
+COLOURS = ("#c1272d", "#e08e0b", "#2a6fbb", "#2e8540")
+
+
+class PatientSpoofer(Attack):
+    """A jump, a wait, then a ramp along the same direction.
+
+    Args:
+        jump: m.
+        patience: between the jump and the ramp, s.
+        rate: of the ramp, m/s.
+        direction: azimuth, degrees clockwise from north.
+        onset: scenario time after which the offset jumps, s; None = the start of the game.
+
+    Raises:
+        ValueError: a value is negative or not finite.
+    """
+
+    kind = "patient-spoofer"
+
+    def __init__(
+        self,
+        jump: float = JUMP,
+        patience: float = PATIENCE,
+        rate: float = RATE,
+        direction: float = EAST,
+        onset: float | None = None,
+    ) -> None:
+        self.jump = validation.non_negative(self.kind, "jump", jump)
+        self.patience = validation.non_negative(self.kind, "patience", patience)
+        self.rate = validation.non_negative(self.kind, "rate", rate)
+        self.direction = validation.finite(self.kind, "direction", direction)
+        self.onset = None if onset is None else validation.time(self.kind, "onset", onset)
+
+    @property
+    def name(self) -> str:
+        """What it is, spelled as a specification."""
+        direction = None if self.direction == EAST else self.direction
+        return spell(
+            self.kind, self.jump, patience=self.patience, rate=self.rate, direction=direction, onset=self.onset
+        )
+
+    def offset(self, clock: Clock) -> Floats:
+        """Jump plus rate times the time since the end of the wait, (N, 3), m ENU."""
+        distance = self.jump * self.started(clock) + self.rate * np.maximum(self.elapsed(clock) - self.patience, 0.0)
+        return distance[:, None] * heading(self.direction)
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the runs of one response went through.
+
+    Attributes:
+        time: of the epochs after the onset, (K,), s from the onset.
+        error: horizontal error of the real-time output, (n, K), m.
+        used: whether the fix was used, (n, K).
+        reset: whether the filter was reset to it, (n, K).
+    """
+
+    time: Floats
+    error: Floats
+    used: Floats
+    reset: Floats
+
+
+def play(response: str, runs: int, seed: int) -> Course:
+    """Runs of the spoofer against a response; run i is seeded ``seed + i``, whatever the response."""
+    scenario = make_scenario(SCENARIO)
+    simulation = Simulation(
+        scenario, PatientSpoofer(onset=ONSET), [make_detector(DETECTOR)], make_response(response), runs, seed
+    )
+    simulation.reset()
+    error, used, reset = [], [], []
+    for k in range(scenario.timeline.num_epochs + 1):
+        decision = simulation.decision
+        simulation.resolve()
+        error.append(horizontal(simulation.error))
+        used.append(simulation.used.copy())
+        reset.append(np.zeros(runs, dtype=bool) if decision.reset is None else decision.reset > 0.0)
+        if k < scenario.timeline.num_epochs:
+            simulation.observe()
+    time = scenario.timeline.times - ONSET
+    after = time > 0.0
+    return Course(time[after], *(np.array(rows).T[:, after] for rows in (error, used, reset)))
+
+
+def row(response: str, course: Course) -> str:
+    """One line of the table."""
+    final = course.error[:, -1]
+    low, high = mean_interval(final)
+    taken = course.reset.any(axis=1)
+    when = f"{np.median(course.time[course.reset[taken].argmax(axis=1)]):.0f} s" if taken.any() else "-"
+    return (
+        f"| `{response}` | {final.mean():.1f} [{low:.1f}, {high:.1f}] | {course.error.max(axis=1).mean():.1f} "
+        f"| {100.0 * taken.mean():.0f} % | {when} | {100.0 * course.used.mean():.0f} % |"
+    )
+
+
+def draw(courses: dict[str, Course], path: Path) -> None:
+    """The median error and the middle 90 % of the runs over time, on a logarithmic axis.
+
+    Raises:
+        ImportError: matplotlib is missing.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
+    figure = Figure(figsize=(8.0, 4.4), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    time = next(iter(courses.values())).time
+    offset = JUMP + RATE * np.maximum(time - PATIENCE, 0.0)
+    axes.plot(time, offset, color="black", linestyle=":", linewidth=1.4, label="offset of the spoofer")
+    for (name, course), colour in zip(courses.items(), COLOURS, strict=True):
+        low, middle, high = np.quantile(course.error, (0.05, 0.5, 0.95), axis=0)
+        axes.fill_between(time, low, high, color=colour, alpha=0.18, linewidth=0.0)
+        axes.plot(time, middle, color=colour, linewidth=1.8, label=name)
+    axes.axvline(PATIENCE, color="grey", linewidth=0.8)
+    axes.text(PATIENCE + 1.0, 0.35, "drag-off begins", color="grey", fontsize=8)
+    axes.set(xlabel="time since the jump, s", ylabel="horizontal error, m", yscale="log")
+    axes.set(xlim=(0.0, time[-1]), ylim=(0.25, 1000.0))
+    axes.grid(alpha=0.25)
+    axes.legend(loc="lower right", fontsize=8, framealpha=0.95)
+    files.write_figure(path, figure)
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Play a patient spoofer against responses: a table, and a figure where one is asked for."""
+    parser = Parser(prog="python -m spoofgym.studies.patient_spoofer", description=main.__doc__)
+    parser.add_argument("--runs", type=count, default=400, help="per response (default: %(default)s)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_figure(parser)
+    options = parser.parse_args(arguments)
+    courses = {response: play(response, options.runs, options.seed) for response in RESPONSES}
+    print(f"{PatientSpoofer(onset=ONSET).name} on {SCENARIO}, {options.runs} runs from seed {options.seed}\n")
+    print("| response | final error, m | greatest error, m | reset | first reset | spoofed fixes used |")
+    print("|---|---|---|---|---|---|")
+    for response, course in courses.items():
+        print(row(response, course))
+    if options.figure is not None:
+        draw({name: courses[name] for name in DRAWN}, options.figure)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

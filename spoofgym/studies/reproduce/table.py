@@ -1,0 +1,111 @@
+"""A reproduction on the terminal, 100 columns wide at most."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from spoofgym.studies.reproduce.rows import Grid, Listing, Reproduction, Row, Value
+
+WIDTH = 100
+MARKS = {"reproduced": ("✓", "green"), "partly": ("~", "yellow"), "not reproduced": ("✗", "red")}
+
+
+def print_reproduction(report: Reproduction, console: Console) -> None:
+    """All groups, the readings, and how many rows came out."""
+    width = min(WIDTH, console.width)
+    runs = f"{report.runs} runs, seed {report.seed}"
+    head = Text(f"{report.title}: {runs}", style="bold")
+    if report.quick:
+        head.append("  quick: too few runs for a verdict that counts", style="bold red")
+    console.print(head, width=width)
+    console.print(Text("Ours: median [smallest–largest run].  ✓ reproduced   ~ partly   ✗ not reproduced"), width=width)
+    for group in report.groups:
+        console.print()
+        console.print(Text(group.title, style="bold"), width=width)
+        console.print(_listing(group) if isinstance(group, Listing) else _grid(group), width=width)
+        if group.note:
+            console.print(Padding(Text(group.note, style="dim"), (0, 0, 0, 2)), width=width)
+    console.print()
+    console.print(Text("Readings", style="bold"))
+    for reading in report.readings:
+        console.print(_bullet(reading), width=width)
+    console.print()
+    console.print(tally(report), width=width)
+
+
+def _bullet(text: str) -> Table:
+    """A paragraph whose lines hang behind the dash."""
+    table = Table.grid(padding=(0, 1, 0, 0))
+    table.add_row(" -", Text(text))
+    return table
+
+
+def tally(report: Reproduction) -> Text:
+    """How many rows have each verdict."""
+    line = Text()
+    for verdict, (mark, style) in MARKS.items():
+        count = sum(row.verdict == verdict for row in report.rows)
+        line.append(f"{mark} {verdict} {count}   ", style=style)
+    return line
+
+
+def number(value: Value | None, digits: int = 3) -> str:
+    """So many significant digits, and those before the point."""
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    if value == 0:
+        return "0"
+    size = abs(value)
+    if size >= 1e6 or size < 1e-3:
+        return f"{value:.{digits - 1}e}".replace("e-0", "e-").replace("e+0", "e")
+    return f"{value:.0f}" if round(size) >= 10 ** (digits - 1) else f"{value:.{digits}g}"
+
+
+def _ours(row: Row) -> str:
+    """The value, and its interval more roughly, where there is more to it than the value."""
+    if row.interval is None or len({number(value) for value in (row.value, *row.interval)}) == 1:
+        return number(row.value)
+    low, high = (number(value, 2) for value in row.interval)
+    return number(row.value) if low == high else f"{number(row.value)} [{low}–{high}]"
+
+
+def _frame() -> Table:
+    return Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+
+
+def _listing(group: Listing) -> Table:
+    table = _frame()
+    table.add_column("", no_wrap=True)
+    table.add_column("item, and why", ratio=1)
+    table.add_column("paper", justify="right", max_width=20)
+    table.add_column("ours", justify="right", overflow="fold")
+    for row in group.rows:
+        mark, style = MARKS[row.verdict]
+        item = Text(row.item)
+        item.append(f"\n{row.reason}", style="dim")
+        table.add_row(Text(mark, style=style), item, number(row.paper_value), _ours(row))
+    return table
+
+
+def _grid(group: Grid) -> Table:
+    table = _frame()
+    table.add_column(group.heads[0], overflow="fold")
+    for head in group.heads[1:]:
+        table.add_column(head, justify="right", overflow="fold")
+    for label, cells in group.lines:
+        table.add_row(Text(label), *(_cell(cell) for cell in cells))
+    return table
+
+
+def _cell(row: Row | None) -> Text:
+    if row is None:
+        return Text("")
+    mark, style = MARKS[row.verdict]
+    cell = Text(f"{_ours(row)}\npaper {number(row.paper_value)} ", justify="right")
+    cell.append(mark, style=style)
+    return cell

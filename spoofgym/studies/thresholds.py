@@ -1,0 +1,97 @@
+"""Thresholds of detectors in a scenario, at several average run lengths between false alarms.
+
+    python -m spoofgym.studies.thresholds --scenario liu-flight --arl0 1e3 1e4 1e5
+    python -m spoofgym.studies.thresholds --detector cusum --detector ewma --json -
+
+A threshold that theory gives has an ARL₀ without an interval. What was found is kept on disk (`calibration_cache`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from spoofgym.calibration import calibrated_all
+from spoofgym.command_line import STDOUT, Parser, above_one, add_json
+from spoofgym.detectors import DETECTORS, at_arl0, make_detector
+from spoofgym.detectors.base import Detector
+from spoofgym.program import do_all, give_json, program
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios import make_scenario
+
+DEFAULT_ARL0S = (1e3, 1e4, 1e5)
+
+
+def threshold_rows(scenario: Scenario, detectors: Sequence[str], arl0s: Sequence[float]) -> list[dict[str, Any]]:
+    """A row for each detector and ARL₀.
+
+    Args:
+        scenario: in which thresholds hold.
+        detectors: specifications without a threshold.
+        arl0s: wanted, epochs.
+
+    Raises:
+        ValueError: a detector that is unknown or does not fit the scenario, or an ARL₀ that is not greater than 1.
+    """
+    rows = []
+    for arl0 in arl0s:
+        asked = [make_detector(at_arl0(text, arl0)) for text in detectors]
+        for text, detector in zip(detectors, calibrated_all(asked, scenario), strict=True):
+            rows.append(_row(text, arl0, detector))
+    return sorted(rows, key=lambda row: detectors.index(row["detector"]))
+
+
+def _row(text: str, arl0: float, detector: Detector) -> dict[str, Any]:
+    interval = detector.arl0_interval
+    return {
+        "detector": text,
+        "asked_arl0": arl0,
+        "threshold": detector.threshold,
+        "arl0": detector.arl0,
+        "ci95": None if interval is None else list(interval),
+        "from": "clean runs" if detector.calibrated else "theory or a preset",
+    }
+
+
+def _line(row: dict[str, Any]) -> str:
+    interval = "" if row["ci95"] is None else f"  95 % [{row['ci95'][0]:.4g}, {row['ci95'][1]:.4g}]"
+    reached = "unknown" if row["arl0"] is None else f"{row['arl0']:.4g}"
+    given = f"{row['detector']:<28}{row['asked_arl0']:>10g}{row['threshold']:>12.5g}"
+    return f"{given}  ARL0 {reached}{interval}  ({row['from']})"
+
+
+def fitting(scenario: Scenario) -> list[str]:
+    """The detectors that ask for nothing but what the scenario offers, by their names."""
+    return [name for name in DETECTORS if set(make_detector(name).needs) <= set(scenario.offers)]
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="python -m spoofgym.studies.thresholds",
+        description="Thresholds of detectors at several average run lengths between false alarms.",
+    )
+    add = result.add_argument
+    add("--scenario", default="liu-flight", help="in which they hold (default: %(default)s)")
+    add("--detector", action="append", help="repeatable (default: every family that fits the scenario)")
+    add("--arl0", type=above_one, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
+    add_json(result)
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    scenario = make_scenario(options.scenario)
+    rows = threshold_rows(scenario, options.detector or fitting(scenario), options.arl0)
+    report = {"schema_version": 1, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
+    out = sys.stderr if options.json == STDOUT else sys.stdout
+    do_all(lambda: print("\n".join(map(_line, rows)), file=out), lambda: give_json(report, options.json))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

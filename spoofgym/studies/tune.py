@@ -1,0 +1,97 @@
+"""Tune the classical defenders on the attacks of the training population.
+
+    python -m spoofgym.studies.tune --scenario foi-drive --json out.json
+
+Plays every defender of the grid (`spoofgym.policies.classical.grid`: detector x depth or estimated onset x epochs until
+re-use) on the same games and prints the best. `spoofgym.policies.classical.TUNED` holds what it found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
+from spoofgym.console import console, show
+from spoofgym.detectors import make_detector
+from spoofgym.evaluation.defence import play_response
+from spoofgym.evaluation.defence_metrics import defender_score
+from spoofgym.evaluation.defenders import world_of
+from spoofgym.policies.classical import grid
+from spoofgym.program import do_all, give_json, program
+from spoofgym.responses import make_response
+from spoofgym.scenarios import make_scenario
+
+SEED = 1_000_000_000
+"""Of game 0: none of these games is one of a training, a validation or an evaluation."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(prog="python -m spoofgym.studies.tune", description="Tune the classical defenders.")
+    add = result.add_argument
+    add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
+    add("--episodes", type=count, default=4000, help="games of each defender (default: %(default)s)")
+    add("--seed", type=seed_number, default=SEED, help="of game 0 (default: %(default)s)")
+    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_json(result)
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    terminal = console(stderr=options.json == STDOUT)
+    scenario = make_scenario(options.scenario)
+    world = world_of(scenario, "training", "linear", options.threads, (), grid())
+    rows: list[dict[str, Any]] = []
+    for defender in grid():
+        with terminal.status(defender.name):
+            games = play_response(
+                world,
+                make_detector(defender.detector).name,
+                make_response(defender.response),
+                options.episodes,
+                options.seed,
+            )
+        score = defender_score(games)
+        rows.append(
+            {
+                "detector": defender.detector,
+                "response": defender.response,
+                "mean_error_m": score.mean_error,
+                "ci95_m": list(score.interval),
+                "clean_exclusion_fraction": score.clean_exclusion,
+            }
+        )
+    rows.sort(key=lambda row: float(row["mean_error_m"]))
+    report = {"schema_version": 1, "kind": "tuning", "scenario": scenario.name, "rows": rows}
+    table = tuning_table(report, options.episodes)
+    do_all(lambda: show(terminal, table), lambda: give_json(report, options.json))
+    return 0
+
+
+def tuning_table(report: dict[str, Any], episodes: int) -> Table:
+    """The best of a ``"tuning"`` report for the terminal."""
+    rows = report["rows"]
+    table = Table(title=f"{report['scenario']}: best of {len(rows)} defenders, {episodes} games each", box=None)
+    for title in ("detector", "response", "mean error, m", "clean out"):
+        table.add_column(title, justify="left" if title in ("detector", "response") else "right")
+    for row in rows[:12]:
+        low, high = row["ci95_m"]
+        table.add_row(
+            str(row["detector"]),
+            str(row["response"]),
+            f"{row['mean_error_m']:.3f} ±{0.5 * (high - low):.3f}",
+            f"{row['clean_exclusion_fraction']:.4f}",
+        )
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,123 @@
+"""Protection levels from P and from solution separation, clean and under a replica that climbs slowly.
+
+False-failure probabilities of the random tests are below 1e-7 each.
+"""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from spoofgym.studies import integrity as integrity_study
+from spoofgym.studies.integrity import (
+    BANK,
+    CLEAN,
+    FROM_P,
+    MONITOR,
+    REPLICAS,
+    SLOW,
+    SLOWER,
+    USERS,
+    main,
+    multiplier,
+    play,
+)
+
+pytestmark = pytest.mark.xdist_group("integrity study")  # one worker: the spoofed flight is played once
+FALSE_FAILURE = 1e-8
+RUNS = 40
+HORIZON = 900
+
+
+@pytest.fixture(scope="module")
+def spoofed():
+    return play(SLOW, RUNS, 300, HORIZON)
+
+
+def test_a_level_from_p_holds_without_spoofing():
+    """At most 2e-6 at each of 900 epochs of 40 runs: five or more runs would be misled with 2e-8."""
+    result = play(CLEAN, RUNS, 100, HORIZON).result(FROM_P)
+    assert result.misled.events <= 4
+    assert result.failed.events == 0  # ten sigma
+    assert result.availability == 1.0
+
+
+def test_a_level_from_p_misleads_under_a_slow_replica(spoofed):
+    """90 m of error at the end, five of sigma, and a level that is what it was."""
+    result = spoofed.result(FROM_P)
+    assert result.misled.share == 1.0
+    assert result.hazardously_misled.share == 1.0
+    assert result.failed.share == 1.0
+    assert result.availability == 1.0
+    clean = play(CLEAN, 2, 0, HORIZON)
+    np.testing.assert_allclose(spoofed.level[FROM_P][0], clean.level[FROM_P][0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("user", [BANK, MONITOR])
+def test_a_level_by_separation_holds_until_its_alarm(spoofed, user):
+    """30 s move the position by 6 m, nine sigma of the separation, against a threshold of five.
+
+    So a run is silent at the end of a window with 2e-4 at most, and at the ends of three windows, which share no
+    innovation, with 1e-11. Misled are at most 2e-6 of the runs at each of the first 60 epochs, and of later ones those
+    that are silent yet: 4e-4 in all, so that four or more of 40 would be misled with 3e-9.
+    """
+    assert spoofed.alarm[user][:, 179:].all()
+    result = spoofed.result(user)
+    assert result.misled.events <= 3
+    assert result.failed.events <= 3
+
+
+def test_shares_at_an_epoch_are_those_that_the_levels_promise():
+    """With a P_MD of 0.05: exactly twice that from P without spoofing, at most twice that by separation with it."""
+    runs, p_md = 1000, 0.05
+    clean, replica = (play(signals, runs, 700, 20, p_md) for signals in (CLEAN, SLOW))
+    beyond = int((np.abs(clean.error[:, -1]) > clean.level[FROM_P][:, -1]).sum())
+    assert stats.binomtest(beyond, runs, 2.0 * p_md).pvalue > FALSE_FAILURE
+    for user in (BANK, MONITOR):
+        for k in (4, 9, 19):
+            misled = np.abs(replica.error[:, k]) > replica.level[user][:, k]
+            misled &= ~replica.alarm[user][:, k]
+            assert stats.binom.sf(int(misled.sum()) - 1, runs, 2.0 * p_md) > FALSE_FAILURE
+
+
+@pytest.mark.slow
+def test_a_climb_that_outlasts_the_windows_misleads_the_bank_too():
+    """The coasting of 30 s ago has been spoofed as well; all but a few runs are misled, we ask for half."""
+    result = play(SLOWER, 20, 40).result(BANK)
+    assert result.misled.events >= 10
+
+
+def test_an_alarm_is_held(spoofed):
+    for user in USERS:
+        assert (np.diff(spoofed.alarm[user].astype(int), axis=1) >= 0).all()
+    assert not spoofed.alarm[FROM_P].any()
+
+
+def test_multiplier_is_the_normal_quantile():
+    assert multiplier(1e-6) == pytest.approx(stats.norm.isf(1e-6), rel=1e-12)
+
+
+def test_a_run_does_not_depend_on_its_batch(monkeypatch):
+    whole = play(SLOW, 5, 9, 15)
+    monkeypatch.setattr(integrity_study, "BATCH", 2)
+    parts = play(SLOW, 5, 9, 15)
+    np.testing.assert_array_equal(parts.error, whole.error)
+    for user in USERS:
+        np.testing.assert_array_equal(parts.level[user], whole.level[user])
+
+
+def test_the_command_prints_a_line_for_all_and_draws(capsys, tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(integrity_study, "HORIZON", 60)
+    figure = tmp_path / "new" / "stanford.png"
+    main(["--runs", "2", "--figure", str(figure)])
+    lines = [line.split(" | ") for line in capsys.readouterr().out.splitlines() if line.startswith("| ")][1:]
+    assert [line[0].removeprefix("| ") for line in lines[:: len(USERS)]] == [replica.words for replica in REPLICAS]
+    assert [line[1] for line in lines] == list(USERS) * len(REPLICAS)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("runs", ["0", "-3", "many"])
+def test_no_runs_are_refused(runs, capsys):
+    with pytest.raises(SystemExit):
+        main(["--runs", runs])
+    assert f"expected a whole number, 1 or more, got '{runs}'" in capsys.readouterr().err

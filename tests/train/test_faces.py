@@ -1,0 +1,45 @@
+"""Training programs start from a checkout, and commands that have moved say where."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+MOVED = {
+    "train.evaluate": "spoofgym.studies.evaluate",
+    "train.tune": "spoofgym.studies.tune",
+    "train.wrong_shadow": "spoofgym.studies.wrong_shadow",
+    "spoofgym.evaluation.acna_study": "spoofgym.studies.acna",
+    "spoofgym.evaluation.integrity_study": "spoofgym.studies.integrity",
+    "spoofgym.evaluation.patient_spoofer": "spoofgym.studies.patient_spoofer",
+    "spoofgym.evaluation.reproduce": "spoofgym.studies.reproduce",
+    "spoofgym.evaluation.self_tuning": "spoofgym.studies.self_tuning",
+    "spoofgym.evaluation.thresholds": "spoofgym.studies.thresholds",
+}
+
+
+def run(*command):
+    return subprocess.run([sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("name", ["spoofer", "defender"])
+def test_a_face_is_the_program_of_the_package(name):
+    face = importlib.import_module(f"train.{name}")
+    assert face.main is importlib.import_module(f"spoofgym.learning.{name}").main
+
+
+def test_a_face_runs():
+    result = run("train.spoofer", "--steps", "0")
+    assert result.returncode == 2
+    assert result.stderr.startswith("error: argument --steps: expected a whole number")
+
+
+@pytest.mark.parametrize(("old", "new"), MOVED.items())
+def test_a_moved_command_says_where_it_is(old, new):
+    result = run(old, "--scenario", "liu-flight")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr == f"error: this command has moved: python -m {new}\n"
+    assert importlib.util.find_spec(new) is not None
