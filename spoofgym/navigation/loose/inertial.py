@@ -74,7 +74,7 @@ class InertialBatch(FilterBatch):
         self._held = np.zeros((num_runs, NUM_HELD))
         self._fix = np.zeros((num_runs, 6, 3))
         self._gain = np.zeros((num_runs, dimension, n))
-        self._filters = FilterRuns(self.covariance, self._deviation, self._gain)
+        self._filters = FilterRuns(self.covariance, self._gain, self._deviation, self._whitened)
         self._generators: dict[int, np.random.Generator] = {}
         self._noisy = bool(np.any(model.true_noise) or np.any(model.instability_sigma))
         width = kernels.NUM_SAMPLE_NOISES * model.max_samples + kernels.NUM_EPOCH_NOISES

@@ -34,17 +34,19 @@ class FixNoise(NamedTuple):
 
 
 class FilterRuns(NamedTuple):
-    """The arrays of N filters that an innovation is formed from, and the gain that it leaves.
+    """The arrays of N filters with covariances of their own.
 
     Attributes:
         covariance: P, (N, n, n).
-        deviation: of the present fix, (N, m).
         gain: U' of the last innovation, (N, m, n).
+        deviation: of the present fix, (N, m).
+        whitened: the last innovation, whitened, (N, m).
     """
 
     covariance: Floats
-    deviation: Floats
     gain: Floats
+    deviation: Floats
+    whitened: Floats
 
 
 def constant_noise(covariance: Floats, num_runs: int) -> FilterNoise:

@@ -260,7 +260,7 @@ def innovate(
     """
     fix_position, fix_velocity, lever_arm, latency = reference
     variance, row, scale = noise
-    covariance, deviation, gain = filters
+    covariance, gain, deviation, _ = filters
     residual, innovation, whitened, nis = formed
     m = residual.shape[1]
     observation, arm = np.zeros((m, NUM_NAVIGATION)), np.empty(3)

@@ -58,7 +58,7 @@ class OwnCovarianceNavigator(ErrorBatch):
         n = model.num_states
         self.covariance = np.zeros((num_runs, n, n))
         self._gain = np.zeros((num_runs, model.dimension, n))
-        self._filters = FilterRuns(self.covariance, self._deviation, self._gain)
+        self._filters = FilterRuns(self.covariance, self._gain, self._deviation, self._whitened)
         self._noise = constant_noise(model.measurement_covariance, num_runs) if noise is None else noise
         self.past = History(demands.history, self.covariance, state=self.state, true_bias=self.true_bias)
 
@@ -151,7 +151,7 @@ def _innovate(
 ) -> None:
     """Innovation with each run's own S, and its whitened gain; outputs but the gain stand at the places of the runs."""
     variance, row, scale = noise
-    covariance, deviation, gain = filters
+    covariance, gain, deviation, _ = filters
     residual, innovation, whitened, nis = formed
     m = observation.shape[1]
     cross, factor = np.empty((m, state.shape[1])), np.empty((m, m))
