@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from spoofgym import validation
 from spoofgym.arrays import Runs
-from spoofgym.attacks import opponents
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_seat import DefenderOutcome, DefenderSeat, demands_on
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.envs.privileged import PrivilegedState
 from spoofgym.envs.view import OneSeatGame
 from spoofgym.scenario import Scenario
@@ -69,12 +69,14 @@ class DefenderGame(OneSeatGame):
         names = [detector.name for detector in own]
         if len(set(names)) < len(names):
             raise ValueError(f"{OWNER}: detectors: each detector can be given once only, got {', '.join(names)}")
-        detectors = [deepcopy(detector) for detector in beside] or calibrated_all(own, scenario)
+        detectors = [deepcopy(detector) for detector in beside] or calibrated_for_play(
+            own, scenario, config.fidelity
+        )
         missing = set(names) - {detector.name for detector in detectors}
         if missing:
             raise ValueError(f"detectors of the game are not among those beside it: {', '.join(sorted(missing))}")
         with validation.argument(OWNER, "attacks"):
-            self.attacks = opponents(config.attacks, config.clean)
+            self.attacks = spoofer_pool(config.attacks, config.clean)
         shares = Disturbances(outage_share=config.outage, multipath_share=config.multipath)
         self.confounders = Confounders(shares if disturbances is None else disturbances)
         simulation = Simulation(

@@ -23,7 +23,7 @@ from rich.console import Console
 from stable_baselines3 import PPO
 
 from spoofgym import files
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import Parser
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
@@ -235,7 +235,7 @@ class Training:
 def _validation_world(config: DefenderConfig) -> World:
     scenario = make_scenario(str(config.scenario))
     assert isinstance(config.detectors, tuple)
-    detectors = calibrated_all([make_detector(part) for part in config.detectors], scenario)
+    detectors = calibrated_for_play([make_detector(part) for part in config.detectors], scenario, config.fidelity)
     return World(
         scenario, str(config.attacks), config.clean, tuple(detectors), fidelity=config.fidelity, threads=config.threads
     )

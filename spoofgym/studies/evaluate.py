@@ -21,7 +21,7 @@ from typing import Any
 from rich.console import Console, RenderableType
 
 from spoofgym.attacks import make_attack
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
@@ -144,7 +144,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     if options.defender:
         return _defenders(options, scenario, fidelity, terminal)
     given = options.detector or ["snapshot"]
-    detectors = [calibrated(make_detector(name), scenario, fidelity) for name in given]
+    detectors = calibrated_for_play([make_detector(name) for name in given], scenario, fidelity)
     if isinstance(scenario.family, RecordedFamily):
         return _recorded(options, scenario, detectors)
     policies = [LearnedSpoofer.load(folder) for folder in options.attacker]

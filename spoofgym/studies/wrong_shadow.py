@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 from spoofgym.arrays import Floats
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
@@ -255,7 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     shadows = wrong_shadows(scenario)
-    detectors = [calibrated(make_detector(options.detector), scenario)]
+    detectors = calibrated_for_play([make_detector(options.detector)], scenario, "linear")
     threshold = exact_threshold(scenario, detectors)
     if threshold is None:
         raise ValueError(

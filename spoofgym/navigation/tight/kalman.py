@@ -15,9 +15,9 @@ from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.batch import Weights
 from spoofgym.navigation.error_model import NUM_NAVIGATION
-from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE
+from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE, POSITION
 
-POSITION = 6
+FIRST_POSITION = POSITION.start
 """Place of the position's first state."""
 
 
@@ -272,8 +272,8 @@ def position_response(columns: Runs, values: Floats, factor: Floats, response: F
         for c in range(3):
             response[a, c] = 0.0
         for k in range(3):
-            if columns[a, k] >= POSITION:
-                response[a, columns[a, k] - POSITION] = values[a, k]
+            if columns[a, k] >= FIRST_POSITION:
+                response[a, columns[a, k] - FIRST_POSITION] = values[a, k]
         for c in range(3):
             total = response[a, c]
             for b in range(a):

@@ -273,7 +273,7 @@ def _add_geometry(k: int, sky: Sky, ranges: Ranges, solution: Solution, residual
         s = a % slots
         if ranges.values[k, a, 3] == 0.0:
             continue
-        if ranges.columns[a, 0] == tight_filter.POSITION:
+        if ranges.columns[a, 0] == tight_filter.FIRST_POSITION:
             dx, dy, dz = sky.satellites[k, s, 0] - x, sky.satellites[k, s, 1] - y, sky.satellites[k, s, 2] - z
             residual[a] += np.sqrt(dx * dx + dy * dy + dz * dz) - sky.distance[k, s]
         else:

@@ -6,10 +6,10 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
-from spoofgym.navigation.batch import NO_DEMANDS, Weights
+from spoofgym.navigation.batch import Weights
 from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.history import History, Ring, keep
-from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.interface import NO_DEMANDS, Demands
 from spoofgym.navigation.loose.innovation import FilterRuns
 from spoofgym.navigation.tight import kalman as tight_filter
 from spoofgym.navigation.tight.error_batch import TightErrorBatch

@@ -7,9 +7,9 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.batch import NO_DEMANDS, InnovationArrays, SharedGains, Weights, empty_innovation
+from spoofgym.navigation.batch import InnovationArrays, SharedGains, Weights, empty_innovation
 from spoofgym.navigation.history import History
-from spoofgym.navigation.interface import Demands, Innovation
+from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.tight import kalman as tight_filter
 from spoofgym.navigation.tight.error_batch import TightErrorBatch, at_epochs
 from spoofgym.navigation.tight.model import TightGains, TightModel

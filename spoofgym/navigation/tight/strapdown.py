@@ -10,10 +10,10 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.batch import NO_DEMANDS, Weights
+from spoofgym.navigation.batch import Weights
 from spoofgym.navigation.divergence import blank
 from spoofgym.navigation.history import History
-from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.interface import NO_DEMANDS, Demands
 from spoofgym.navigation.loose.inertial import InertialBatch
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.tight import kernels
