@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from spoofgym import validation
 from spoofgym.arrays import Runs
-from spoofgym.attacks import opponents
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_seat import DefenderOutcome, DefenderSeat, demands_on
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.envs.privileged import PrivilegedState
 from spoofgym.envs.view import OneSeatGame
 from spoofgym.scenario import Scenario
@@ -76,7 +76,7 @@ class DefenderGame(OneSeatGame):
         if missing:
             raise ValueError(f"detectors of the game are not among those beside it: {', '.join(sorted(missing))}")
         with validation.argument(OWNER, "attacks"):
-            self.attacks = opponents(config.attacks, config.clean)
+            self.attacks = spoofer_pool(config.attacks, config.clean)
         shares = Disturbances(outage_share=config.outage, multipath_share=config.multipath)
         self.confounders = Confounders(shares if disturbances is None else disturbances)
         simulation = Simulation(
