@@ -35,7 +35,7 @@ class DefenderGame(OneSeatGame):
         seat: the agent's.
         attacks: the population from which each lane draws its opponent.
         confounders: the receiver's outages and multipath.
-        privileged: called, it gives what a critic may know in training and no defender ever, (N, P).
+        privileged: function that returns the truth that a critic may see in training, (N, P). No defender sees it.
     """
 
     seat: DefenderSeat
@@ -54,8 +54,8 @@ class DefenderGame(OneSeatGame):
         Args:
             config: its arguments.
             num_lanes: N.
-            beside: detectors, with their thresholds, among which are all of the game's own: the simulation runs these,
-                the defender sees its own.
+            beside: detectors that the simulation runs, with thresholds set; empty = the detectors of ``config``. They
+                must include those of ``config``. The defender sees the statistics of its own detectors only.
             streams: random streams of the lanes; None = of fresh entropy, until the lanes are seeded.
             disturbances: of the receiver, in place of those of ``config``.
 

@@ -40,6 +40,11 @@ class PolicySpoofer(Attack):
         """The specification that builds this attack."""
         return self._name
 
+    @property
+    def knowledge(self) -> str:
+        """What it knows of the victim: "blind", "shadow" or "full"."""
+        return self._config.knowledge
+
     def join(self, simulation: Simulation) -> None:
         """Sit down in a simulation.
 

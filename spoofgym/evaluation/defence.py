@@ -16,7 +16,8 @@ from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.envs.opponents import spoofer_pool
-from spoofgym.evaluation.monte_carlo import batches, horizontal
+from spoofgym.evaluation.monte_carlo import batches
+from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching

@@ -105,8 +105,8 @@ def carry(
 ) -> None:
     """Carry runs over so many epochs each, part by part: mechanization, covariance, and the state kept at the fix.
 
-    The states are kept before every epoch. The unaided solution minus the filter, auxiliary (N, 15), is carried by the
-    same Φ, or is none, (N, 0).
+    Each state is stored in the history before its epoch begins. ``auxiliary`` is the unaided solution minus the
+    filter's, which the transition Φ of the filter carries, too; its shape is (N, 15), or (N, 0) if disabled.
     """
     # named tuples are taken apart here: in the loop that would cost more than the equations
     samples, bounds, places, latency_samples, density, instability_sigma, instability_decay = steps
