@@ -34,6 +34,7 @@ pytestmark = pytest.mark.xdist_group("defender programs")  # one worker: the run
 
 SCENARIO = "foi-drive:horizon=60"
 SHORT = ["--scenario", SCENARIO, "--detector", "snapshot", "--lanes", "4", "--validation-episodes", "20"]
+SHORT += ["--critic-games", "1"]
 STEPS = 1200
 ROW_KEYS = {
     "defender",
