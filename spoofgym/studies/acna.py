@@ -33,6 +33,7 @@ from spoofgym.detectors.acna import (
     gnss_drift,
 )
 from spoofgym.detectors.base import Detector
+from spoofgym.figures import new_figure
 from spoofgym.navigation.facts import ODOMETER
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.program import do_all, give_json, program
@@ -206,13 +207,7 @@ def draw(grids: dict[str, Rates], path: Path) -> None:
     Raises:
         ImportError: matplotlib is missing.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
-    figure = Figure(figsize=(9.0, 5.6), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(figsize=(9.0, 5.6), dpi=150, layout="constrained")
     axes = figure.subplots(2, 2, sharex="col", sharey="row")
     for column, (test, grid) in enumerate(grids.items()):
         symbol, level = SYMBOLS[test]
