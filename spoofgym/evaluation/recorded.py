@@ -12,7 +12,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.evaluation.episodes import horizontal
 from spoofgym.geodesy import position_difference
 from spoofgym.kernels import njit
 from spoofgym.logs.log import interpolate
