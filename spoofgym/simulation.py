@@ -13,10 +13,19 @@ from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.clean_starts import far_too_low, require_clean_starts
-from spoofgym.detectors.base import Detector, require_threshold, seen_dimension, statistic_of
+from spoofgym.detectors.base import Detector, statistic_of
+from spoofgym.fitting import fit_attack, fit_detectors, fit_response
 from spoofgym.navigation.divergence import diverged_error
-from spoofgym.navigation.facts import LINEAR_MODEL, RANGES
-from spoofgym.navigation.interface import Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
+from spoofgym.navigation.interface import (
+    NO_DEMANDS,
+    Clock,
+    Decision,
+    Demands,
+    Epoch,
+    FilterView,
+    Innovation,
+    Spoof,
+)
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
@@ -26,7 +35,6 @@ from spoofgym.streams import RunStreams
 OWNER = "Simulation"
 ON_DIVERGENCE = ("raise", "hold")
 MAX_REDRAWS = 100
-NO_DEMANDS = Demands()
 
 
 class Simulation:
@@ -88,22 +96,18 @@ class Simulation:
         scenario.check_fidelity(fidelity)
         self._holds = validation.one_of(OWNER, "on_divergence", on_divergence, ON_DIVERGENCE) == "hold"
         self.scenario = scenario
+        self._family = family = scenario.family
         self.fidelity = fidelity
         self.num_runs = num_runs
         self.streams = _streams(seed, streams, num_runs)
-        for detector in detectors:
-            validation.instance(OWNER, "detectors", detector, Detector, "detectors, as make_detector gives")
+        fit_detectors(OWNER, detectors, scenario, num_runs)
         self.detectors = {detector.name: detector for detector in detectors}
-        self._bind_detectors()
         self.attack = attack
         if attack is not None:
-            validation.instance(OWNER, "attack", attack, Attack, "an attack, as make_attack gives, or None")
-            self._bind_attack(attack)
+            fit_attack(OWNER, attack, scenario, num_runs)
         self.response = response
         if response is not None:
-            validation.instance(OWNER, "response", response, Response, "a response, as make_response gives, or None")
-            scenario.facts.require(f"response {response.name!r}", response.needs)
-            response.bind(num_runs)
+            fit_response(OWNER, response, scenario, num_runs)
         memory = max((detector.memory for detector in detectors), default=0)
         self._white_memory = memory if scenario.matched else 0
         self.burn_in = 0 if scenario.matched else memory
@@ -111,10 +115,10 @@ class Simulation:
             demands |= part.demands
         self.confounders = confounders
         if confounders is not None:
-            confounders.bind(scenario.timeline, num_runs, 3 if scenario.coupling == "tight" else scenario.dimension)
+            confounders.bind(scenario.timeline, num_runs)
             demands |= Demands(excludes=True)
         self.slices = RunSlices(threads)
-        self.navigator = scenario.navigator(fidelity, demands, self.burn_in, num_runs, self.slices)
+        self.navigator = family.navigator(fidelity, demands, self.burn_in, num_runs, self.slices)
         self._times = scenario.times(self.burn_in)
         self._velocity = scenario.velocity(self.burn_in)
         self._intervals = np.diff(self._times, prepend=self._times[0] - scenario.timeline.interval)
@@ -130,40 +134,8 @@ class Simulation:
         if scenario.random:
             require_clean_starts(scenario.name, list(self.detectors.values()), self._passing)
 
-    def _bind_attack(self, attack: Attack) -> None:
-        if attack.needs_velocity and (self.scenario.dimension != 6 or self.scenario.coupling == "tight"):
-            tight = self.scenario.coupling == "tight"
-            given = "ranges" if tight else f"fixes of position alone (m = {self.scenario.dimension})"
-            raise ValueError(
-                f"attack {attack.name!r} needs fixes with velocity (m = 6), scenario {self.scenario.name!r} has {given}"
-            )
-        if attack.needs_ranges:
-            self.scenario.facts.require(f"attack {attack.name!r}", (RANGES,))
-            slots = self.scenario.satellites(np.arange(self.scenario.timeline.num_epochs + 1), 0)
-            attack.meet(np.unique(slots[slots >= 0]))
-        attack.bind(self.scenario.timeline, self.num_runs)
-        attack.follow(self.scenario.velocity_in_steps())
-        if attack.needs_model:
-            self.scenario.facts.require(f"attack {attack.name!r}", (LINEAR_MODEL,))
-            attack.study(self.scenario.linear_model())
-
-    def _bind_detectors(self) -> None:
-        for detector in self.detectors.values():
-            detector.bind(self.num_runs, self._seen_dimension(detector))
-            self.scenario.facts.require(f"detector {detector.name!r}", detector.needs)
-            detector.know(self.scenario.facts)
-            require_threshold(detector)
-
-    def _seen_dimension(self, detector: Detector) -> int:
-        return seen_dimension(detector, self.scenario.dimension, self.scenario.coupling == "tight")
-
     def _blank_epoch(self) -> Epoch:
-        n, m = self.num_runs, self.scenario.dimension
-        innovation = Innovation(np.zeros((n, m)), np.zeros((n, m, m)), np.zeros((n, m)), np.zeros(n))
-        if self.scenario.coupling == "tight":
-            innovation = replace(
-                innovation, range_response=np.zeros((n, m, 3)), present=np.zeros((n, m), dtype=np.bool_)
-            )
+        n, innovation = self.num_runs, self._family.blank_innovation(self.num_runs)
         statistics = {name: np.zeros(n) for name in self.detectors}
         available = np.ones(n, dtype=bool)
         return Epoch(np.zeros(n, dtype=np.int64), np.zeros(n), innovation, statistics, available, self._view(self._all))
@@ -208,7 +180,7 @@ class Simulation:
         """
         bank = {name: copy.copy(detector) for name, detector in self.detectors.items()}
         for detector in bank.values():
-            detector.bind(len(runs), self._seen_dimension(detector))
+            detector.bind(len(runs), self._family.seen_dimension(detector.in_position))
         self.offset[runs], self.clock_offset[runs] = 0.0, 0.0
         self.used[runs] = False
         if self.attack is not None:
@@ -236,11 +208,11 @@ class Simulation:
         """One try of some runs at the burn-in; whether each alarmed in it, (n,)."""
         part = {name: copy.copy(detector) for name, detector in bank.items()}
         for detector in part.values():
-            detector.bind(len(runs), self._seen_dimension(detector))
-        initial = self.scenario.draw_initial(runs, self.burn_in, self.streams)
-        self._noise[runs] = self.scenario.draw_receiver_noise(runs, initial, self.burn_in, self.streams)
+            detector.bind(len(runs), self._family.seen_dimension(detector.in_position))
+        initial = self._family.draw_initial(runs, self.burn_in, self.streams)
+        self._noise[runs] = self._family.draw_receiver_noise(runs, initial, self.burn_in, self.streams)
         if self.confounders is not None:
-            self._noise[runs, self.burn_in :] += self.scenario.disturbed(self.confounders.noise[runs], self.burn_in)
+            self._noise[runs, self.burn_in :] += self._family.disturbed(self.confounders.noise[runs], self.burn_in)
         self.navigator.reset(runs, initial, self.streams)
         alarmed = np.zeros(len(runs), dtype=bool)
         for epoch in self._white_epochs(runs):
@@ -270,7 +242,7 @@ class Simulation:
         if memory == 0:
             return []
         whitened = np.stack([self.streams(run, "memory").standard_normal((memory, m)) for run in runs])
-        white, epochs = self.scenario.white_innovations(), []
+        white, epochs = self._family.white_innovations(), []
         for k in range(memory):
             index = np.full(len(runs), k - memory)
             time = self.scenario.timeline.start + index * self.scenario.timeline.interval
@@ -362,7 +334,7 @@ class Simulation:
         given = self._no_offset if offset is None else validation.rows(OWNER, "offset", offset, self.num_runs, (3, 4))
         spoof = self._spoof(clock, attack, given)
         deviation = self._noise[self._all, following]
-        deviation += self.scenario.spoofed(self.fidelity, following, self.burn_in, spoof)
+        deviation += self._family.spoofed(self.fidelity, following, self.burn_in, spoof)
         self.offset, self.clock_offset = spoof.offset, spoof.clock
         navigator.propagate()
         innovation = navigator.innovate(deviation)
@@ -387,8 +359,8 @@ class Simulation:
         satellites = None
         if attack is not None:
             rate = attack.velocity(clock, rate)
-            if self.scenario.coupling == "tight":
-                slots = self.scenario.satellites(clock.index + self.burn_in, self.burn_in)
+            if self._family.slots:
+                slots = self._family.satellites(clock.index + self.burn_in, self.burn_in)
                 satellites = attack.captured(clock, slots)
         return Spoof(offset.copy(), rate, moved.copy(), (moved - self.clock_offset) / intervals, satellites)
 

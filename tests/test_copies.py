@@ -19,7 +19,7 @@ from spoofgym.immutable import Immutable
 from spoofgym.parallel import RunSlices
 from spoofgym.responses import RESPONSES, make_response
 from spoofgym.responses.base import Response
-from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from tests.golden.parts import ready, spelled
@@ -125,12 +125,11 @@ def game_of(attack: Attack) -> Scenario:
         return make_scenario(TIGHT)
     first = 300 if attack.onset is None else round(attack.onset) - 5
     scenario = make_scenario(f"liu-flight:horizon=120,onset={first}")
-    assert isinstance(scenario, SimulatedScenario)
     if not attack.needs_velocity:
         return scenario
     sigma = (0.1, 0.1, 0.1)
-    tuning = replace(scenario.tuning, measurement_sigma=scenario.tuning.measurement_sigma + sigma)
-    return replace(scenario, receiver=replace(scenario.receiver, velocity_sigma=sigma), tuning=tuning)
+    tuning = replace(scenario.family.tuning, measurement_sigma=scenario.family.tuning.measurement_sigma + sigma)
+    return scenario.changed(receiver=replace(scenario.family.receiver, velocity_sigma=sigma), tuning=tuning)
 
 
 @pytest.mark.parametrize("name", RESPONSES)

@@ -170,8 +170,8 @@ def test_what_cannot_be_is_refused(flight, model):
         ewma(1.5, 3.0)
     with pytest.raises(ValueError, match="n must be a whole number, 1 or more, got 0"):
         window_mean(0, 3.0)
-    sigmas = (*flight.tuning.measurement_sigma, 0.1, 0.1, 0.1)
+    sigmas = (*flight.family.tuning.measurement_sigma, 0.1, 0.1, 0.1)
     receiver = Receiver(rate=1.0, white_sigma=sigmas[:3], velocity_sigma=sigmas[3:])
-    six = replace(flight, receiver=receiver, tuning=replace(flight.tuning, measurement_sigma=sigmas))
+    six = flight.changed(receiver=receiver, tuning=replace(flight.family.tuning, measurement_sigma=sigmas))
     with pytest.raises(ValueError, match=r"a zero-alarm attack exists only for position fixes \(m = 3\).* m = 6"):
         zero_alarm(six.linear_model(), gate(3.0))

@@ -30,7 +30,7 @@ def matched():
 def coloured():
     """A filter that is not matched: detectors are burnt in by clean epochs."""
     base = liu_flight(onset=30.0, horizon=HORIZON, imu="tactical")
-    return dataclasses.replace(base, receiver=Receiver(markov_sigma=(3.0, 3.0, 5.0), markov_time=30.0))
+    return base.changed(receiver=Receiver(markov_sigma=(3.0, 3.0, 5.0), markov_time=30.0))
 
 
 def simulation(scenario, runs, fidelity="linear", threads=1, seed=60, attack=True, **options):
@@ -155,10 +155,9 @@ def test_an_offset_enters_the_fix_with_its_rate():
     """z falls by the offset, and the velocity's by the offset's change over the interval."""
     base = matched()
     sigma = (3.7, 3.7, 6.0, 0.1, 0.1, 0.2)
-    scenario = dataclasses.replace(
-        base,
+    scenario = base.changed(
         receiver=Receiver(velocity_sigma=sigma[3:]),
-        tuning=dataclasses.replace(base.tuning, measurement_sigma=sigma),
+        tuning=dataclasses.replace(base.family.tuning, measurement_sigma=sigma),
     )
     clean, spoofed = (Simulation(scenario, num_runs=2, seed=1) for _ in range(2))
     for sim in (clean, spoofed):

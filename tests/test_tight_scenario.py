@@ -1,6 +1,5 @@
 """Games on the tightly coupled filter: what a spoofer adds to ranges, burn-ins, partial resets, disturbances."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,11 +28,11 @@ def spoof(offset, clock=0.0, satellites=None):
 def test_spoofed_ranges_are_those_of_a_receiver_elsewhere_with_another_clock(scenario, fidelity, tolerance):
     """To first order in the linear fidelity: 1.2 km leave 4 cm of the range's curvature, and 0.1 m of the Earth's."""
     offset, clock, k = np.array([900.0, -700.0, 300.0]), 55.0, 7
-    added = scenario.spoofed(fidelity, np.array([k]), 0, spoof(offset, clock))[0]
+    added = scenario.family.spoofed(fidelity, np.array([k]), 0, spoof(offset, clock))[0]
     time = scenario.times(0)[k]
-    truth = scenario.trajectory.position[round(time * scenario.trajectory.rate)]
-    place = round(time * scenario.rate) - 1
-    satellites, present = scenario.geometry.position[place], scenario.geometry.present[place]
+    truth = scenario.truth.trajectory.position[round(time * scenario.truth.trajectory.rate)]
+    place = round(time * scenario.truth.rate) - 1
+    satellites, present = scenario.family.geometry.position[place], scenario.family.geometry.present[place]
     places = displace(truth, offset), truth
     distance = [np.linalg.norm(satellites - geodetic_to_ecef(position), axis=1) for position in places]
     expected = np.where(present, distance[0] - distance[1] + clock, 0.0)
@@ -44,7 +43,7 @@ def test_spoofed_ranges_are_those_of_a_receiver_elsewhere_with_another_clock(sce
 def test_only_captured_satellites_are_spoofed(scenario):
     captured = np.zeros((1, scenario.slots), dtype=bool)
     captured[0, [0, 3]] = True
-    added = scenario.spoofed("linear", np.array([7]), 0, spoof([10.0, 0.0, 0.0], 3.0, captured))[0]
+    added = scenario.family.spoofed("linear", np.array([7]), 0, spoof([10.0, 0.0, 0.0], 3.0, captured))[0]
     assert np.flatnonzero(added).tolist() == [0, 3, scenario.slots, scenario.slots + 3]
 
 
@@ -112,7 +111,7 @@ def test_multipath_disturbs_the_code_alone_and_a_fix_by_as_much(scenario):
     simulation = Simulation(scenario, None, (), None, 2, 3, confounders=confounders, demands=Demands(excludes=True))
     simulation.reset()
     noise = confounders.noise
-    added = scenario.disturbed(noise, 0)
+    added = scenario.family.disturbed(noise, 0)
     assert np.abs(noise).max() > 1.0
     assert not added[..., scenario.slots :].any()
     dynamics = scenario.tight_model().dynamics
@@ -128,7 +127,7 @@ def test_an_outage_hides_the_ranges(scenario):
     simulation = Simulation(scenario, None, (), None, 3, 3, confounders=confounders)
     simulation.reset()
     hidden = 0
-    for _ in range(scenario.horizon):
+    for _ in range(scenario.truth.horizon):
         simulation.resolve()
         epoch = simulation.observe()
         out = ~epoch.available
@@ -141,4 +140,4 @@ def test_an_outage_hides_the_ranges(scenario):
 @pytest.mark.parametrize("observable", ["kilometres", ""])
 def test_an_unknown_observable_is_refused(scenario, observable):
     with pytest.raises(ValueError, match="observable must be one of carrier, rate"):
-        replace(scenario, observable=observable)
+        scenario.changed(observable=observable)

@@ -1,5 +1,6 @@
 """Thresholds at an equal false-alarm rate, found from clean runs and kept on disk."""
 
+from spoofgym.calibration.play import calibrated_for_play
 from spoofgym.calibration.thresholds import (
     Calibration,
     calibrate,
@@ -16,6 +17,7 @@ __all__ = [
     "calibrate_together",
     "calibrated",
     "calibrated_all",
+    "calibrated_for_play",
     "measure_arl0",
     "poisson_interval",
 ]

@@ -344,7 +344,7 @@ def _find(detectors: Sequence[Detector], scenario: Scenario, fidelity: str) -> d
     groups: dict[int, list[Detector]] = {}
     for detector in detectors:
         if scenario.matched and not detector.needs_view and detector.target_arl0 is not None:
-            clean = white_statistics(scenario.white_innovations(), scenario.timeline.num_epochs, scenario.facts)
+            clean = white_statistics(scenario.family.white_innovations(), scenario.timeline.num_epochs, scenario.facts)
             result = calibrate(detector, clean, detector.target_arl0)
             found[detector.name] = _setting(result, None)
         else:

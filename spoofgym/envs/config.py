@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 from spoofgym import validation
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
+from spoofgym.navigation.family import COUPLINGS
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
-from spoofgym.scenarios import COUPLINGS
 
 KNOWLEDGE = ("blind", "shadow", "full")
 ACTIONS = ("rate", "innovation")

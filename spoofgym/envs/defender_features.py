@@ -12,6 +12,7 @@ from spoofgym.detectors.chi_square import quantile
 from spoofgym.envs.observation import AXES, Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
 from spoofgym.kernels import njit
+from spoofgym.navigation.facts import RANGES
 from spoofgym.responses.onset import OnsetEstimator
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -73,7 +74,7 @@ class DefenderFeatures:
     ) -> None:
         """Allocate the memory of ``num_lanes`` lanes, which see the ``detectors`` of these names."""
         self._simulation = simulation
-        ranges = scenario.coupling == "tight"
+        ranges = RANGES in scenario.offers
         dimension = 3 if ranges else scenario.dimension
         self.fields = defender_fields(dimension, tuple(detectors), scenario.defender_scale)
         self._common = len(self.fields)

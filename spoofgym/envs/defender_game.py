@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.arrays import Runs
 from spoofgym.attacks import opponents
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
@@ -69,7 +69,9 @@ class DefenderGame(OneSeatGame):
         names = [detector.name for detector in own]
         if len(set(names)) < len(names):
             raise ValueError(f"{OWNER}: detectors: each detector can be given once only, got {', '.join(names)}")
-        detectors = [deepcopy(detector) for detector in beside] or calibrated_all(own, scenario)
+        detectors = [deepcopy(detector) for detector in beside] or calibrated_for_play(
+            own, scenario, config.fidelity
+        )
         missing = set(names) - {detector.name for detector in detectors}
         if missing:
             raise ValueError(f"detectors of the game are not among those beside it: {', '.join(sorted(missing))}")

@@ -37,9 +37,9 @@ def require_fitting(victim: Scenario, shadow: Scenario) -> None:
         "start, s": (theirs.start, mine.start),
         "interval, s": (theirs.interval, mine.interval),
         "epochs": (theirs.num_epochs, mine.num_epochs),
-        "coupling": (shadow.coupling, victim.coupling),
+        "coupling": (shadow.family.coupling, victim.family.coupling),
     }
-    if shadow.coupling == victim.coupling == "loose":
+    if not shadow.slots and not victim.slots:
         pairs["dimension of the fix"] = (shadow.dimension, victim.dimension)
     differing = [f"{name}: {has} instead of {needs}" for name, (has, needs) in pairs.items() if has != needs]
     if differing:

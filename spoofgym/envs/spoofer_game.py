@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spoofgym import validation
 from spoofgym.arrays import Runs
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.spoofer_seat import OWNER, SpooferOutcome, SpooferSeat, frame_fields
@@ -54,7 +54,7 @@ class SpooferGame(OneSeatGame):
             raise ValueError(f"{OWNER}: detector: each detector can be given once only, got {', '.join(names)}")
         frame_fields(config, scenario, names, num_lanes)  # refuses what does not fit before thresholds are looked for
         with validation.argument(OWNER, "detector"):
-            detectors = [calibrated(detector, scenario) for detector in detectors]
+            detectors = calibrated_for_play(detectors, scenario, config.fidelity)
         with validation.argument(OWNER, "response"):
             response: Response | None = deepcopy(make_response(config.response))
         if config.on_alarm == "end":

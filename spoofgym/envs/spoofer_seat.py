@@ -20,6 +20,7 @@ from spoofgym.envs.observation import AXES, Field, Squash, observation_space, sp
 from spoofgym.envs.shadow import ShadowFilter, require_fitting, shadow_model
 from spoofgym.envs.standing import Standing, horizontal_error
 from spoofgym.envs.tight_shadow import TightShadowFilter
+from spoofgym.navigation.facts import RANGES
 from spoofgym.navigation.interface import RangeNavigator
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -73,7 +74,7 @@ def frame_fields(
     Raises:
         ValueError: the action does not fit the scenario, or the observation is too large.
     """
-    ranges = scenario.coupling == "tight"
+    ranges = RANGES in scenario.offers
     if ranges and config.action == "innovation":
         raise ValueError(
             f"action 'innovation' is for filters on fixes: scenario {scenario.name!r} is tightly coupled, and no "
@@ -123,7 +124,7 @@ class SpooferSeat:
         num_lanes = simulation.num_runs
         fields = frame_fields(config, scenario, detectors, num_lanes)
         self.fields = stacked_fields(fields, config.frames)
-        self._ranges = scenario.coupling == "tight"
+        self._ranges = RANGES in scenario.offers
         self.shadow: ShadowFilter | TightShadowFilter | None = None
         if config.knowledge != "blind":
             with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.defender_game import DefenderGame
@@ -84,7 +84,7 @@ def world_of(
     wanted = [str(part) for policy in policies for part in _watched(policy)]
     names = dict.fromkeys([*common, *wanted, *(item.detector for item in classical)])
     built = {detector.name: detector for detector in map(make_detector, names)}
-    detectors = tuple(calibrated_all(list(built.values()), scenario))
+    detectors = tuple(calibrated_for_play(list(built.values()), scenario, fidelity))
     return World(scenario, attacks, 0.5, detectors, fidelity=fidelity, threads=threads)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
@@ -152,7 +152,7 @@ class Matrix:
         names = [detector.name for detector in detectors]
         if len(set(names)) < len(names):
             raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
-        return calibrated_all(detectors, self.scenario, self.fidelity)
+        return calibrated_for_play(detectors, self.scenario, self.fidelity)
 
     def _games(
         self,

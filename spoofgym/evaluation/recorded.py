@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from spoofgym.geodesy import position_difference
 from spoofgym.kernels import njit
 from spoofgym.logs.log import interpolate
 from spoofgym.mechanization import mechanize
-from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 from spoofgym.simulation import Simulation
 from spoofgym.validation import written
 
@@ -43,7 +44,7 @@ class CleanFigures:
 
 
 def evaluate_recorded(
-    scenario: RecordedScenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
+    scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
 ) -> list[dict[str, Any]]:
     """Play every attack on the log, every fix used, and compare with the unspoofed run.
 
@@ -75,14 +76,14 @@ def evaluate_recorded(
     return [{"attack": attack.name} | common | _play(scenario, attack, detectors, false) for attack in attacks]
 
 
-def clean_figures(scenario: RecordedScenario, detectors: Sequence[Detector]) -> CleanFigures:
+def clean_figures(scenario: Scenario, detectors: Sequence[Detector]) -> CleanFigures:
     """Play the clean log from `SETTLING` after the alignment on, or from where the memory of the detectors is full.
 
     Raises:
         ValueError: the log ends before.
     """
-    time = scenario.epoch_time
-    begin = scenario.log.fixes.time[scenario.alignment.fix] + SETTLING
+    log = recorded_family(scenario)
+    time, begin = log.epoch_time, log.align_time + SETTLING
     for detector in detectors:
         detector.bind(1, scenario.dimension)
     memory = max((detector.memory for detector in detectors), default=0)
@@ -92,7 +93,7 @@ def clean_figures(scenario: RecordedScenario, detectors: Sequence[Detector]) -> 
             f"scenario {scenario.name!r}: the log ends at {written(time[-1])} s; clean figures need fixes after "
             f"{written(begin)} s and {memory} epochs"
         )
-    whole = replace(scenario, onset=float(time[first]), horizon=None)
+    whole = scenario.changed(onset=float(time[first]), horizon=None)
     simulation = Simulation(whole, None, detectors, seed=0, fidelity="strapdown")
     epoch = simulation.reset()
     nis, alarms = [epoch.innovation.nis[0]], [simulation.alarm[0]]
@@ -108,29 +109,30 @@ def clean_figures(scenario: RecordedScenario, detectors: Sequence[Detector]) -> 
     )
 
 
-def held_out_errors(scenario: RecordedScenario, begin: float) -> Floats | None:
+def held_out_errors(scenario: Scenario, begin: float) -> Floats | None:
     """Horizontal error of the clean run at the reference's own times that are no fixes, from ``begin`` on, (n,), m.
 
     Between the fixes the filter's state is carried on by its inertial samples alone. Where the reference has no epochs
     of its own, all of them count, after the fix was used, but those in its holes. None = there is nothing to compare.
     """
-    reference = scenario.log.reference
+    log = recorded_family(scenario)
+    reference = log.log.reference
     if reference is None:
         return None
-    model, clean = scenario.model, scenario.clean
-    end = scenario.epoch_time[-1]
+    model, clean = log.model, log.clean
+    end = log.epoch_time[-1]
     inside = (reference.time >= begin) & (reference.time < end)
-    nearest = np.searchsorted(scenario.epoch_time, reference.time)
+    nearest = np.searchsorted(log.epoch_time, reference.time)
     distance = np.minimum(
-        np.abs(reference.time - scenario.epoch_time[np.minimum(nearest, len(scenario.epoch_time) - 1)]),
-        np.abs(reference.time - scenario.epoch_time[np.maximum(nearest - 1, 0)]),
+        np.abs(reference.time - log.epoch_time[np.minimum(nearest, len(log.epoch_time) - 1)]),
+        np.abs(reference.time - log.epoch_time[np.maximum(nearest - 1, 0)]),
     )
     own = inside & (distance > SAME_TIME)
     if not own.any():
-        late = (scenario.epoch_time >= begin) & scenario.compared
+        late = (log.epoch_time >= begin) & log.compared
         if not late.any():
             return None
-        truth, _ = interpolate(reference, scenario.epoch_time[late])
+        truth, _ = interpolate(reference, log.epoch_time[late])
         return horizontal(position_difference(clean.position[1:][late], truth))
     position = np.empty((len(model.step), 3))
     _coast(
@@ -145,7 +147,7 @@ def held_out_errors(scenario: RecordedScenario, begin: float) -> Floats | None:
         position,
     )
     origin = clean.position[0]
-    start = float(scenario.log.fixes.time[scenario.alignment.fix])
+    start = recorded_family(scenario).align_time
     ends = start + np.cumsum(model.step)
     track = position_difference(position, origin)
     at_fixes = position_difference(clean.position[:-1], origin)
@@ -186,7 +188,7 @@ def _coast(
             result[i] = p
 
 
-def _clean_alarms(scenario: RecordedScenario, detectors: Sequence[Detector]) -> Flags:
+def _clean_alarms(scenario: Scenario, detectors: Sequence[Detector]) -> Flags:
     """Whether any detector alarms in the game without an attack, at epochs 1..K, (K,)."""
     simulation = Simulation(scenario, None, detectors, seed=0, fidelity="strapdown")
     alarms = []
@@ -199,17 +201,17 @@ def _clean_alarms(scenario: RecordedScenario, detectors: Sequence[Detector]) -> 
 
 
 def _play(
-    scenario: RecordedScenario, attack: Attack, detectors: Sequence[Detector], false: Flags
+    scenario: Scenario, attack: Attack, detectors: Sequence[Detector], false: Flags
 ) -> dict[str, Any]:
     """The part of a row that depends on the attack; ``false``: the alarms without one, (K,)."""
     simulation = Simulation(scenario, attack, detectors, seed=0, fidelity="strapdown")
     onset = scenario.timeline.start if attack.onset is None else attack.onset
     spoofing = not isinstance(attack, NoAttack)
     detection: tuple[float, float | None] | None = None
-    errors = []
+    errors, log = [], recorded_family(scenario)
     simulation.reset()
     simulation.resolve()
-    for alarmed, compared in zip(false, scenario.compared[scenario.first + 1 :], strict=False):
+    for alarmed, compared in zip(false, log.compared[log.first + 1 :], strict=False):
         time = float(simulation.observe().time[0])
         after = time > onset
         if after and spoofing and detection is None and simulation.alarm[0] and not alarmed:

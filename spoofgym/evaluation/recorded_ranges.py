@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -20,17 +20,17 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.episodes import horizontal
 from spoofgym.geodesy import position_difference
-from spoofgym.logs.fix_rows import UNMEASURED_SIGMA
 from spoofgym.logs.log import Fixes, interpolate, read_log
 from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.program import moved
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios.recorded import recorded
-from spoofgym.scenarios.recorded_scenario import SETTLING, RecordedScenario
+from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
 from spoofgym.validation import written
 
-FILTERS: dict[str, Callable[[str], RecordedScenario]] = {
+FILTERS: dict[str, Callable[[str], Scenario]] = {
     "loose, receiver's fixes": partial(recorded, fixes="phone"),
     "loose, fixes from ranges": partial(recorded, fixes="ranges"),
     "tight": partial(recorded, coupling="tight"),
@@ -72,13 +72,13 @@ class Course:
     thresholds: dict[str, float]
 
 
-def detectors_of(scenario: RecordedScenario) -> dict[str, Detector]:
+def detectors_of(scenario: Scenario) -> dict[str, Detector]:
     """Those of `DETECTORS` that this filter can have."""
     made = {label: make_detector(text) for label, text in DETECTORS.items()}
     return {label: detector for label, detector in made.items() if set(detector.needs) <= set(scenario.offers)}
 
 
-def play(scenario: RecordedScenario, rate: float, onsets: Floats) -> Course:
+def play(scenario: Scenario, rate: float, onsets: Floats) -> Course:
     """Pull north from each onset on, a run each.
 
     Args:
@@ -106,9 +106,8 @@ def play(scenario: RecordedScenario, rate: float, onsets: Floats) -> Course:
         simulation.resolve()
         position.append(navigator.position.copy())
     counted = np.array(degrees, dtype=np.float64)
-    if scenario.coupling == "loose":
-        variance = np.diagonal(scenario.model.measurement_covariance, axis1=1, axis2=2)
-        counted -= (variance >= UNMEASURED_SIGMA**2).sum(axis=1)[scenario.first + 1 :]
+    log = recorded_family(scenario)
+    counted -= log.unmeasured[log.first + 1 :]
     return Course(
         time,
         np.array(position),
@@ -262,14 +261,16 @@ def side_by_side(path: str) -> dict[str, Any]:
     """
     fixes = read_log(path).fixes
     scenarios = {name: build(path) for name, build in FILTERS.items()}
-    begin = max(scenario.align_time for scenario in scenarios.values()) + SETTLING
-    end = min(scenario.epoch_time[-1] for scenario in scenarios.values())
+    logs = {name: recorded_family(scenario) for name, scenario in scenarios.items()}
+    begin = max(log.align_time for log in logs.values()) + SETTLING
+    end = min(log.epoch_time[-1] for log in logs.values())
     onsets = game_onsets(fixes, begin, end)
     memory = max(make_detector(text).memory for text in DETECTORS.values())
     whole = {}
     for name, scenario in scenarios.items():
-        first = max(int(np.searchsorted(scenario.epoch_time, begin)), memory)
-        whole[name] = replace(scenario, onset=float(scenario.epoch_time[first]), horizon=None)
+        time = logs[name].epoch_time
+        first = max(int(np.searchsorted(time, begin)), memory)
+        whole[name] = scenario.changed(onset=float(time[first]), horizon=None)
     clean = {name: play(scenario, 0.0, np.array([np.inf])) for name, scenario in whole.items()}
     filters, games = [], []
     for name, scenario in whole.items():
@@ -278,7 +279,7 @@ def side_by_side(path: str) -> dict[str, Any]:
         for rate in PULLS:
             course = play(scenario, rate, onsets)
             games += pulled_rows(name, rate, onsets, course, errors(course, fixes), clean[name])
-    tight = scenarios["tight"]
+    tight = logs["tight"]
     assert isinstance(tight, RecordedRanges)
     return {
         "kind": "recorded-ranges",

@@ -26,10 +26,11 @@ from spoofgym.evaluation.metrics import NORMAL_95, attacker_score, undetected_er
 from spoofgym.evaluation.monte_carlo import Episodes
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import SCHEMA_VERSION, detector_entry
+from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.optimum import bounded_optimum, expected_play
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.scripted import OffsetSequence
-from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import GRADES
 from spoofgym.specification import Specification, spell
@@ -76,13 +77,14 @@ def wrong_shadows(scenario: Scenario) -> list[Shadow]:
     Raises:
         ValueError: a scenario that is not simulated, or has no option ``imu`` or ``sigma``.
     """
-    if not isinstance(scenario, SimulatedScenario):
+    family = scenario.family
+    if not isinstance(family, LooseFamily):
         raise ValueError(
             f"scenario {scenario.name!r} is none with simulated fixes (coupling=loose), on whose filter the optimum is "
             "known"
         )
-    sigma = scenario.tuning.measurement_sigma[0]
-    grades = [Shadow(f"imu {name}", _with(scenario, imu=name)) for name in GRADES if name != scenario.grade.name]
+    sigma = family.tuning.measurement_sigma[0]
+    grades = [Shadow(f"imu {name}", _with(scenario, imu=name)) for name in GRADES if name != family.grade.name]
     factors = [Shadow(f"sigma x {factor:g}", _with(scenario, sigma=factor * sigma)) for factor in SIGMA_FACTORS]
     return grades + factors
 

@@ -22,7 +22,7 @@ from rich.console import Console
 from stable_baselines3 import PPO
 
 from spoofgym import files
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import Parser
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
@@ -32,9 +32,9 @@ from spoofgym.learning.defender_ppo import Settings, begin, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
 from spoofgym.learning.watch import CHECKPOINTS, Watch, mean_return
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
 from spoofgym.program import program
-from spoofgym.scenario import FIDELITIES
 from spoofgym.scenarios import make_scenario
 
 DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
@@ -223,7 +223,7 @@ class Training:
 def _validation_world(config: DefenderConfig) -> World:
     scenario = make_scenario(str(config.scenario))
     assert isinstance(config.detectors, tuple)
-    detectors = calibrated_all([make_detector(part) for part in config.detectors], scenario)
+    detectors = calibrated_for_play([make_detector(part) for part in config.detectors], scenario, config.fidelity)
     return World(
         scenario, str(config.attacks), config.clean, tuple(detectors), fidelity=config.fidelity, threads=config.threads
     )

@@ -45,7 +45,7 @@ def alarm_probability_is_known(config: SpooferConfig) -> bool:
         and config.forfeit == 1.0
         and config.tracking_sigma == 0.0
         and scenario.matched
-        and scenario.coupling == "loose"
+        and not scenario.slots
     )
 
 

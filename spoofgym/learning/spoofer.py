@@ -27,8 +27,8 @@ from spoofgym.learning.ppo import Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
 from spoofgym.learning.watch import Watch, mean_return
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import program
-from spoofgym.scenario import FIDELITIES
 
 
 def parser() -> argparse.ArgumentParser:

@@ -24,8 +24,6 @@ from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 
-NO_DEMANDS = Demands()
-
 
 class Weights(NamedTuple):
     """How an innovation weights its measurements.

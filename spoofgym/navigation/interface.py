@@ -216,6 +216,10 @@ class Demands:
         )
 
 
+NO_DEMANDS = Demands()
+"""Every run uses every fix, and nothing else is asked for."""
+
+
 class Navigator(Protocol):
     """N filters that go through the epochs of a scenario in two half-steps.
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from spoofgym.attacks.base import Attack
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.optimum import LinearTest, bounded_optimum, cumulative_optimum, ewma, gate, window_mean, zero_alarm
@@ -64,6 +64,7 @@ def signed_tests(scenario: Scenario, arl0: float) -> list[LinearTest]:
 
 
 def _threshold(detector: str, scenario: Scenario, arl0: float) -> float:
-    ready = calibrated(make_detector(f"{detector},arl0={write(float(arl0))}"), scenario)
+    asked = make_detector(f"{detector},arl0={write(float(arl0))}")
+    (ready,) = calibrated_for_play([asked], scenario, scenario.fidelities[0])
     assert ready.threshold is not None
     return ready.threshold

@@ -10,6 +10,7 @@ from typing import Any
 
 from spoofgym import validation
 from spoofgym.logs.log_files import State, log_state
+from spoofgym.navigation.family import COUPLINGS
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.cache import ScenarioCache
 from spoofgym.scenarios.foi_drive import foi_drive
@@ -28,8 +29,6 @@ SCENARIOS: dict[str, Callable[..., Scenario]] = {
     "shadmehri-flight": shadmehri_flight,
     "song-robot": song_robot,
 }
-
-COUPLINGS = ("loose", "tight")
 
 _CACHE = ScenarioCache()
 
@@ -72,10 +71,10 @@ def make_scenario(scenario: str | Scenario, coupling: str | None = None) -> Scen
         return _made(scenario)
     validation.one_of("scenario", "coupling", coupling, COUPLINGS)
     made = _build(_with_coupling(scenario, coupling)) if isinstance(scenario, str) else make_scenario(scenario)
-    if made.coupling != coupling:
+    if made.family.coupling != coupling:
         choose = ", ".join(name for name in SCENARIOS if _takes_coupling(name))
         raise ValueError(
-            f"scenario {made.name!r} is {made.coupling}ly coupled, not {coupling}ly; with coupling=loose or "
+            f"scenario {made.name!r} is {made.family.coupling}ly coupled, not {coupling}ly; with coupling=loose or "
             f"coupling=tight: {choose}"
         )
     return made

@@ -14,13 +14,15 @@ import math
 from functools import lru_cache
 
 from spoofgym import validation
+from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.scenario import SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import MOST_EPOCHS, NOISE_FACTORS
 from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.specification import spell
 from spoofgym.trajectory import Accelerate, Straight, Trajectory, Turn, fly
+from spoofgym.truth import SimulatedTruth
 
 FOI_START = (math.radians(58.41), math.radians(15.62), 60.0)
 """Near Linköping: latitude rad, longitude rad, height m."""
@@ -61,7 +63,7 @@ def foi_drive(
     receiver: str = "white",
     process_noise: float = 1.0,
     bias_states: bool = True,
-) -> SimulatedScenario:
+) -> Scenario:
     """The drive as a game from 20 s to 250 s.
 
     With the receiver ``white`` its error is white, 1 m per axis, and the filter's R is just that: the filter is
@@ -91,37 +93,39 @@ def foi_drive(
     bias_states = validation.boolean(owner, "bias_states", bias_states)
     white = receiver == "white"
     sigma = (1.0, 1.0, 1.0) if white else (3.0, 3.0, 3.0)
-    return SimulatedScenario(
-        name=spell(
-            owner,
-            horizon=None if horizon == 230 else horizon,
-            onset=None if onset == 20.0 else onset,
-            imu=None if imu == "fog" else imu,
-            receiver=None if white else receiver,
-            process_noise=None if process_noise == 1.0 else process_noise,
-            bias_states=None if bias_states else bias_states,
-        ),
-        trajectory=foi_trajectory(),
-        grade=grade(imu),
-        receiver=Receiver(
-            white_sigma=(1.0, 1.0, 1.0) if white else (0.1, 0.1, 0.1),
-            markov_sigma=(0.0, 0.0, 0.0) if white else (0.6, 0.6, 0.6),
-            markov_time=0.0 if white else 60.0,
-        ),
-        tuning=FilterTuning(
-            velocity_sigma=(STANDSTILL, STANDSTILL, STANDSTILL),
-            position_sigma=sigma,
-            initial_scale=1.0,
-            position_random_walk=0.0,
-            process_noise_scale=process_noise,
-            measurement_sigma=sigma,
-            bias_states=bias_states,
-        ),
-        onset=onset,
-        horizon=horizon,
+    name = spell(
+        owner,
+        horizon=None if horizon == 230 else horizon,
+        onset=None if onset == 20.0 else onset,
+        imu=None if imu == "fog" else imu,
+        receiver=None if white else receiver,
+        process_noise=None if process_noise == 1.0 else process_noise,
+        bias_states=None if bias_states else bias_states,
+    )
+    fixes = Receiver(
+        white_sigma=(1.0, 1.0, 1.0) if white else (0.1, 0.1, 0.1),
+        markov_sigma=(0.0, 0.0, 0.0) if white else (0.6, 0.6, 0.6),
+        markov_time=0.0 if white else 60.0,
+    )
+    tuning = FilterTuning(
+        velocity_sigma=(STANDSTILL, STANDSTILL, STANDSTILL),
+        position_sigma=sigma,
+        initial_scale=1.0,
+        position_random_walk=0.0,
+        process_noise_scale=process_noise,
+        measurement_sigma=sigma,
+        bias_states=bias_states,
+    )
+    truth = SimulatedTruth(
+        name=name, trajectory=foi_trajectory(), rate=fixes.rate, onset=onset, horizon=horizon
+    )
+    family = LooseFamily(
+        truth=truth, grade=grade(imu), receiver=fixes, tuning=tuning, true_position_random_walk=0.0
+    )
+    return Scenario(
+        family=family,
         drag_off_rate=(4.0, 4.0, 4.0),
-        depth_table=DEPTHS,
         error_scale=10.0,
         defender_scale=10.0,
-        true_position_random_walk=0.0,
+        depth_table=DEPTHS,
     )

@@ -8,22 +8,26 @@ of the IMU, whose table is missing in the text that we have.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from spoofgym import validation
+from spoofgym.navigation.family import COUPLINGS, FilterFamily
+from spoofgym.navigation.loose.family import LooseFamily
+from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenario import ALERT_LIMITS, Scenario
 from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import range_fix_along
 from spoofgym.sensors.ranging import KUJUR
 from spoofgym.sensors.receiver import ZERO, Receiver
 from spoofgym.specification import spell
-from spoofgym.tight_scenario import TightScenario
 from spoofgym.trajectory import Straight, Trajectory, fly
+from spoofgym.truth import SimulatedTruth
 from spoofgym.validation import written
 
 START = (math.radians(41.0 + 50.0 / 60.0 + 10.0 / 3600.0), -math.radians(87.0 + 37.0 / 60.0 + 30.0 / 3600.0), 12192.0)
@@ -35,11 +39,8 @@ LONGEST = 7200.0
 """Of the flight, s: its samples stay in memory."""
 MASK = math.radians(5.0)
 TUNING = FilterTuning(position_random_walk=0.0, initial_scale=1.0, position_sigma=(10.0, 10.0, 10.0))
-ALERT_LIMITS = (556.0, 50.0)
-"""Horizontal and vertical, m: RNP 0.3, and the limit of an approach with vertical guidance (DO-229, LNAV/VNAV)."""
 HOUR = 4.0
 """Of the constellation's day: eight satellites are then in view all along the flight."""
-COUPLINGS = ("loose", "tight")
 DRAG_OFF_RATES = {"loose": 4.0, "tight": 0.25}
 """Largest rate of a spoofed position, m/s per axis, by coupling; ours. A carrier shows at once what a fix hides: a step
 of half a metre is always detected, so that a unit of 4 m/s would leave a spoofer nothing to choose."""
@@ -111,45 +112,49 @@ def kujur_flight(
         vertical_alert_limit=None if limits[1] == ALERT_LIMITS[1] else limits[1],
         drag_off_rate=None if fastest == usual else fastest,
     )
-    trajectory = kujur_trajectory(onset + horizon / RATE)
-    if coupling == "loose":
-        loose = _loose(name, trajectory, horizon, onset, hour, imu)
-        return replace(loose, alert_limits=limits, drag_off_rate=(fastest,) * 3)
-    return TightScenario(
+    truth = SimulatedTruth(
         name=name,
-        trajectory=trajectory,
-        grade=grade(imu),
-        errors=KUJUR,
-        constellation=gps_24(),
-        start_time=3600.0 * hour,
+        trajectory=kujur_trajectory(onset + horizon / RATE),
         rate=RATE,
-        mask=MASK,
-        tuning=TUNING,
         onset=onset,
         horizon=horizon,
+    )
+    return Scenario(
+        family=FAMILIES[coupling](truth, hour, imu),
         drag_off_rate=(fastest,) * 3,
-        clock_rate=fastest,
         error_scale=10.0,
+        defender_scale=50.0,
+        clock_rate=fastest,
         alert_limits=limits,
     )
 
 
-def _loose(
-    name: str, trajectory: Trajectory, horizon: int, onset: float, hour: float, imu: str
-) -> SimulatedScenario:
-    ranges = range_fix_along(KUJUR, gps_24(), trajectory, RATE, 3600.0 * hour, MASK)
-    east, north, up = np.sqrt(np.diag(ranges.covariance(round(onset * RATE) - 1))).tolist()
-    return SimulatedScenario(
-        name=name,
-        trajectory=trajectory,
+def _tight(truth: SimulatedTruth, hour: float, imu: str) -> TightFamily:
+    """The filter that takes code and carrier of every satellite."""
+    return TightFamily(
+        truth=truth,
+        grade=grade(imu),
+        errors=KUJUR,
+        constellation=gps_24(),
+        start_time=3600.0 * hour,
+        mask=MASK,
+        tuning=TUNING,
+    )
+
+
+def _loose(truth: SimulatedTruth, hour: float, imu: str) -> LooseFamily:
+    """The filter that takes least-squares fixes from the code."""
+    ranges = range_fix_along(KUJUR, gps_24(), truth.trajectory, RATE, 3600.0 * hour, MASK)
+    east, north, up = np.sqrt(np.diag(ranges.covariance(truth.first(0)))).tolist()
+    return LooseFamily(
+        truth=truth,
         grade=grade(imu),
         receiver=Receiver(rate=RATE, white_sigma=ZERO),
         tuning=replace(TUNING, measurement_sigma=(east, north, up)),
-        onset=onset,
-        horizon=horizon,
-        drag_off_rate=(DRAG_OFF_RATES["loose"],) * 3,
-        error_scale=10.0,
         true_position_random_walk=TUNING.position_random_walk,
-        defender_scale=50.0,
         ranges=ranges,
     )
+
+
+FAMILIES: dict[str, Callable[[SimulatedTruth, float, str], FilterFamily]] = {"loose": _loose, "tight": _tight}
+"""What makes the filter, by coupling."""

@@ -7,12 +7,16 @@ the shapes of the manoeuvres are ours.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 
 from spoofgym import validation
+from spoofgym.navigation.family import COUPLINGS, FilterFamily
+from spoofgym.navigation.loose.family import LooseFamily
+from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenario import ALERT_LIMITS, Scenario
 from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade, require_grade
@@ -20,8 +24,8 @@ from spoofgym.sensors.range_fix import MASK, range_fix_along
 from spoofgym.sensors.ranging import LIU
 from spoofgym.sensors.receiver import RATES, ZERO, Receiver
 from spoofgym.specification import spell
-from spoofgym.tight_scenario import TightScenario
 from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly
+from spoofgym.truth import SimulatedTruth
 from spoofgym.validation import written
 
 LIU_END = (math.radians(34.6887), math.radians(108.1915), 2283.0)
@@ -49,7 +53,6 @@ DRAG_OFF_RATES = {"loose": 4.0, "tight": 0.25}
 """Largest rate of a spoofed position, m/s per axis, by coupling; ours. A range rate, good to 5 cm/s, shows at once what
 a fix hides."""
 NOISES = ("white", "ranges")
-COUPLINGS = ("loose", "tight")
 
 
 def liu_trajectory() -> Trajectory:
@@ -77,8 +80,8 @@ def liu_flight(
     noise: str = "white",
     coupling: str = "loose",
     drag_off_rate: float | None = None,
-    horizontal_alert_limit: float = Scenario.alert_limits[0],
-    vertical_alert_limit: float = Scenario.alert_limits[1],
+    horizontal_alert_limit: float = ALERT_LIMITS[0],
+    vertical_alert_limit: float = ALERT_LIMITS[1],
 ) -> Scenario:
     """The Liu flight: aviation-grade INS and a single-frequency GPS receiver.
 
@@ -143,76 +146,71 @@ def liu_flight(
         noise=None if noise == "white" else noise,
         coupling=None if coupling == "loose" else coupling,
         drag_off_rate=None if fastest == usual else fastest,
-        horizontal_alert_limit=None if limits[0] == Scenario.alert_limits[0] else limits[0],
-        vertical_alert_limit=None if limits[1] == Scenario.alert_limits[1] else limits[1],
+        horizontal_alert_limit=None if limits[0] == ALERT_LIMITS[0] else limits[0],
+        vertical_alert_limit=None if limits[1] == ALERT_LIMITS[1] else limits[1],
     )
-    if coupling == "tight":
-        if noise != "white" or coloured or sigma != 3.7:
-            raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
-        return _tight(name, horizon, onset, rate, imu, fastest, limits)
+    if coupling == "tight" and (noise != "white" or coloured or sigma != 3.7):
+        raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
     if noise == "ranges" and coloured:
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
-    loose = _loose(name, horizon, onset, rate, imu, fastest, markov_sigma, markov_time, sigma, noise)
-    return loose if limits == loose.alert_limits else replace(loose, alert_limits=limits)
-
-
-def _loose(
-    name: str,
-    horizon: int,
-    onset: float,
-    rate: float,
-    imu: str,
-    fastest: float,
-    markov_sigma: float,
-    markov_time: float,
-    sigma: float,
-    noise: str,
-) -> SimulatedScenario:
-    white = (sigma, sigma, 6.0 * (sigma / 3.7))
-    receiver = Receiver(
-        rate=rate,
-        white_sigma=white,
-        markov_sigma=(markov_sigma, markov_sigma, markov_sigma * white[2] / white[0]),
-        markov_time=markov_time,
-    )
-    ranges = None
-    if noise == "ranges":
-        receiver = Receiver(rate=rate, white_sigma=ZERO)
-        ranges = range_fix_along(LIU, gps_24(), _trajectory(), rate)
-    return SimulatedScenario(
-        name=name,
-        trajectory=_trajectory(),
-        grade=grade(imu),
-        receiver=receiver,
-        tuning=FilterTuning(measurement_sigma=white),
-        onset=onset,
-        horizon=horizon,
+    truth = SimulatedTruth(name=name, trajectory=_trajectory(), rate=rate, onset=onset, horizon=horizon)
+    fixes = _Fixes(sigma, markov_sigma, markov_time, noise)
+    return Scenario(
+        family=FAMILIES[coupling](truth, imu, fixes),
         drag_off_rate=(fastest,) * 3,
         error_scale=10.0,
         defender_scale=50.0,
+        clock_rate=fastest,
+        alert_limits=limits,
+    )
+
+
+@dataclass(frozen=True)
+class _Fixes:
+    """What a user says of the fixes; as in `liu_flight`."""
+
+    sigma: float
+    markov_sigma: float
+    markov_time: float
+    noise: str
+
+
+def _loose(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> LooseFamily:
+    """The filter that takes fixes."""
+    white = (fixes.sigma, fixes.sigma, 6.0 * (fixes.sigma / 3.7))
+    receiver = Receiver(
+        rate=truth.rate,
+        white_sigma=white,
+        markov_sigma=(fixes.markov_sigma, fixes.markov_sigma, fixes.markov_sigma * white[2] / white[0]),
+        markov_time=fixes.markov_time,
+    )
+    ranges = None
+    if fixes.noise == "ranges":
+        receiver = Receiver(rate=truth.rate, white_sigma=ZERO)
+        ranges = range_fix_along(LIU, gps_24(), truth.trajectory, truth.rate)
+    return LooseFamily(
+        truth=truth,
+        grade=grade(imu),
+        receiver=receiver,
+        tuning=FilterTuning(measurement_sigma=white),
         true_position_random_walk=FilterTuning().position_random_walk,
         ranges=ranges,
     )
 
 
-def _tight(
-    name: str, horizon: int, onset: float, rate: float, imu: str, fastest: float, limits: tuple[float, float]
-) -> TightScenario:
-    return TightScenario(
-        name=name,
-        trajectory=_trajectory(),
+def _tight(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> TightFamily:
+    """The filter that takes code and rate of every range."""
+    return TightFamily(
+        truth=truth,
         grade=grade(imu),
         errors=LIU,
         constellation=gps_24(),
         start_time=0.0,
-        rate=rate,
         mask=MASK,
         tuning=FilterTuning(),
-        onset=onset,
-        horizon=horizon,
-        drag_off_rate=(fastest,) * 3,
-        clock_rate=fastest,
-        error_scale=10.0,
-        alert_limits=limits,
         observable="rate",
     )
+
+
+FAMILIES: dict[str, Callable[[SimulatedTruth, str, _Fixes], FilterFamily]] = {"loose": _loose, "tight": _tight}
+"""What makes the filter, by coupling."""

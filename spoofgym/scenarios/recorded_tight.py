@@ -1,4 +1,4 @@
-"""A recorded drive or flight as a game on its ranges, which a tightly coupled filter takes.
+"""The tightly coupled filter on a log, whose ranges it takes.
 
 As on recorded fixes, nothing is drawn: the samples and the ranges carry their own errors. What lies between the ranges
 of the log and those of a reference trajectory is replayed to the filter, and the spoofer adds to it. The reference is
@@ -19,20 +19,20 @@ from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.divergence import Solution
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
-from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
 from spoofgym.navigation.linear_model import ErrorDynamics
 from spoofgym.navigation.loose.kernels import mechanize_part
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.tight.model import TightDynamics, TightModel, cold_covariance, tight_dynamics, tight_model
+from spoofgym.navigation.tight.ranges import RangeFamily, along, captured_ranges, disturbed_ranges
 from spoofgym.navigation.tight.replay import TightReplayNavigator
 from spoofgym.navigation.tight.states import BIAS, CLOCK
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios.clean_run import TightCleanRun, tight_clean_run
-from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.recorded_family import RecordedFamily
 from spoofgym.sensors.ranging import KUJUR, DrawnErrors, RangeErrors, pseudoranges
 from spoofgym.streams import RunStreams
-from spoofgym.tight_scenario import along, captured_ranges, disturbed_ranges
 
 ERRORS = replace(KUJUR, code_multipath_sigma=0.0)
 """Slow errors of a satellite, the troposphere, and the clock of a usual quartz oscillator, as in Kujur 2024. Multipath
@@ -42,8 +42,8 @@ CLOCK_SIGMA = (100.0, 10.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedRanges(RecordedScenario):
-    """A game on the ranges of a log, for a tightly coupled filter; epochs are equally spaced, some without satellites.
+class RecordedRanges(RecordedFamily, RangeFamily):
+    """Tightly coupled filters on the ranges of a log; epochs are equally spaced, some without satellites.
 
     White noise of code and range rate follows from C/N0, as that of the fixes made from them. The slow errors of each
     satellite, the troposphere and the clock are those of ``errors``. The filter is not matched: nobody knows the errors
@@ -58,22 +58,20 @@ class RecordedRanges(RecordedScenario):
         "range rates of the wrong sign or unit (range_rate_mps), wrong ranges or ephemerides, ranges and IMU on "
         "different clocks (imu_delay_s), a wrong mounting (imu_to_body_frd), an IMU that is worse than its grade"
     )
-    coupling = "tight"
-    offers = (INERTIAL_SOLUTION, RANGES)
-    clock_rate = 4.0
+    offers = RangeFamily.offers
 
     epochs: RangeEpochs
     errors: RangeErrors = ERRORS
 
     @property
-    def slots(self) -> int:  # type: ignore[override]
+    def slots(self) -> int:
         """S, satellites of the log."""
         return self.epochs.geometry.num_slots
 
     @property
-    def dimension(self) -> int:  # type: ignore[override]
-        """m, of the ranges of all slots."""
-        return 2 * self.slots
+    def unmeasured(self) -> Runs:
+        """None at any epoch, (E,)."""
+        return np.zeros(len(self.epoch_time), dtype=np.int64)
 
     @property
     def facts(self) -> FilterFacts:
@@ -194,8 +192,7 @@ class RecordedRanges(RecordedScenario):
     def navigator(
         self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
     ) -> TightReplayNavigator:
-        """A navigator that starts from the clean run's filter before epoch -burn_in; arguments as in `Scenario`."""
-        self.check_fidelity(fidelity)
+        """A navigator that starts from the clean run's filter before epoch -burn_in; arguments as in `FilterFamily`."""
         first, stop = self._first(burn_in), self.last + 1
         tight = _bare(self._dynamics(burn_in), self.clean.covariance[first])
         satellites, clock = self.ranges.geometry.position[first:stop], self.clean.state[first + 1 : stop + 1, CLOCK]

@@ -12,13 +12,15 @@ from functools import lru_cache
 
 from spoofgym import validation
 from spoofgym.navigation.loose.adaptation import Adaptation
+from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.scenario import SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import SPEEDS
 from spoofgym.sensors.imu import grade
 from spoofgym.sensors.receiver import RATES, Receiver
 from spoofgym.specification import spell
 from spoofgym.trajectory import Straight, Trajectory, fly
+from spoofgym.truth import SimulatedTruth
 
 START = (math.radians(35.69), math.radians(51.31), 3000.0)
 """Near Tehran: latitude rad, longitude rad, height m."""
@@ -63,7 +65,7 @@ def shadmehri_flight(
     onset: float | None = None,
     window: int | None = None,
     guard: str | None = None,
-) -> SimulatedScenario:
+) -> Scenario:
     """The flight as a game that ends at 30 s, with a filter of constant R and Q or one that tunes itself.
 
     The paper's attack is ``ramp:RATE,direction=45,onset=20`` with √2 times its rate: it spoofs east and north at that
@@ -97,31 +99,35 @@ def shadmehri_flight(
     guard = default.guard if guard is None else validation.text(owner, "guard", guard)
     first = 2.0 / rate
     start = first if onset is None else validation.between(owner, "onset", onset, first, DURATION - 1.0 / rate)
-    return SimulatedScenario(
-        name=spell(
-            owner,
-            filter=None if filter == "common" else filter,
-            noise=None if white else noise,
-            rate=None if rate == 10.0 else rate,
-            speed=None if speed == 200.0 else speed,
-            onset=None if start == first else start,
-            window=None if window == default.window else window,
-            guard=None if guard == default.guard else guard,
-        ),
+    name = spell(
+        owner,
+        filter=None if filter == "common" else filter,
+        noise=None if white else noise,
+        rate=None if rate == 10.0 else rate,
+        speed=None if speed == 200.0 else speed,
+        onset=None if start == first else start,
+        window=None if window == default.window else window,
+        guard=None if guard == default.guard else guard,
+    )
+    receiver = Receiver(
+        rate=rate,
+        white_sigma=SIGMA if white else (0.0, 0.0, 0.0),
+        markov_sigma=(0.0, 0.0, 0.0) if white else MARKOV_SIGMA,
+        markov_time=0.0 if white else MARKOV_TIME,
+    )
+    truth = SimulatedTruth(
+        name=name,
         trajectory=shadmehri_trajectory(speed),
-        grade=grade("navigation"),
-        receiver=Receiver(
-            rate=rate,
-            white_sigma=SIGMA if white else (0.0, 0.0, 0.0),
-            markov_sigma=(0.0, 0.0, 0.0) if white else MARKOV_SIGMA,
-            markov_time=0.0 if white else MARKOV_TIME,
-        ),
-        tuning=FilterTuning(measurement_sigma=SIGMA),
+        rate=rate,
         onset=start,
         horizon=math.floor((DURATION - start) * rate + 1e-6),
-        drag_off_rate=(5.0, 5.0, 5.0),
-        error_scale=10.0,
-        defender_scale=10.0,
+    )
+    family = LooseFamily(
+        truth=truth,
+        grade=grade("navigation"),
+        receiver=receiver,
+        tuning=FilterTuning(measurement_sigma=SIGMA),
         true_position_random_walk=FilterTuning().position_random_walk,
         adaptation=Adaptation(window, guard) if filter == "self-tuning" else None,
     )
+    return Scenario(family=family, drag_off_rate=(5.0, 5.0, 5.0), error_scale=10.0, defender_scale=10.0)

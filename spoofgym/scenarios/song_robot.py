@@ -9,29 +9,22 @@ receiver's error. Standing still is the paper's data set Ψ1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
 
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
-from spoofgym.burn_in_cache import kept_by_burn_in
-from spoofgym.navigation.credible.kalman import CredibleTuning, credible_linear_model, standing_start
-from spoofgym.navigation.credible.runs import ANCHORING, AuxiliaryRule, CredibleModel, CredibleNavigator
-from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
-from spoofgym.navigation.interface import Demands
-from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose.warm_start import COLOUR, NUM_JOINT
-from spoofgym.parallel import RunSlices
+from spoofgym.arrays import Floats
+from spoofgym.navigation.credible.family import CredibleFamily
+from spoofgym.navigation.credible.kalman import CredibleTuning
+from spoofgym.navigation.credible.runs import ANCHORING, AuxiliaryRule
+from spoofgym.navigation.credible.truth import PlanarTruth
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G
-from spoofgym.sensors.odometer import GRADES, Odometer, OdometerGrade, PlanarMotion, odometer_grade
-from spoofgym.sensors.receiver import Receiver, draw_noise
+from spoofgym.sensors.odometer import GRADES, Odometer, PlanarMotion, odometer_grade
+from spoofgym.sensors.receiver import Receiver
 from spoofgym.specification import spell
-from spoofgym.streams import RunStreams
-from spoofgym.timeline import Timeline
 
 COURT = (13.4, 6.1)
 """Sides of the rectangle, m."""
@@ -52,10 +45,9 @@ AUXILIARY = 0.49 / SIGMA
 """What the filter believes, over the sigma of the fix: its gains do not depend on that. Together they are tuned to the
 lag of the paper's filter behind a drag-off, 5.5 s: (107.73 - 103.84) m at 0.707 m/s."""
 
-IMU_BIAS = np.repeat([5.0 * 3600.0 * DEGREE_PER_HOUR, 60e3 * MICRO_G], 3)
+IMU_BIAS = (5.0 * 3600.0 * DEGREE_PER_HOUR,) * 3 + (60e3 * MICRO_G,) * 3
 """Offsets that the data sheet of the MPU-9250 allows, rad/s and m/s²; the filter estimates none."""
 
-DATA = ("rectangle", "static")
 NOISES = ("markov", "white")
 DEPTHS = (0, 2, 5, 10, 20, 30)
 """Depth table; ours: the paper's detectors take 1 to 27 s."""
@@ -96,143 +88,17 @@ def _arc(yaw: float, length: float, turn: float) -> Floats:
     return CORNER * np.array([math.cos(yaw) - math.cos(after), math.sin(after) - math.sin(yaw)])
 
 
-def standstill(times: Floats) -> PlanarMotion:
-    """No motion at all."""
+def standstill(times: Floats, step: float) -> PlanarMotion:
+    """No motion at all; arguments as in `rectangle`."""
     nowhere = np.zeros((len(times), 2))
     return PlanarMotion(nowhere, np.full(len(times), START_YAW), nowhere, np.zeros(len(times) - 1))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SongRobot(Scenario):
-    """A robot in the plane with the credible filter, in the linear fidelity.
-
-    The filter is linear, and so is what an offset does to it (`linear_model`); but its model is wrong (it takes an
-    auxiliary position that drifts for independent measurements), so that its clean innovations are not white.
-
-    Attributes:
-        name: the specification that builds it.
-        data: ``rectangle`` or ``static``.
-        odometer: the encoders.
-        grade: of their errors and the yaw's.
-        receiver: of the fixes.
-        tuning: what the filter believes.
-        rule: for the auxiliary position.
-        onset: time of epoch 0, s.
-        horizon: epochs of the game.
-    """
-
-    fidelities = ("linear",)
-    offers = (ODOMETER, LINEAR_MODEL)
-    matched = False
-    dimension = 3
-    drag_off_rate = (SPEED, SPEED, SPEED)
-    error_scale = 5.0
-    defender_scale = 1.0
-    depth_table = DEPTHS
-
-    name: str
-    data: str
-    odometer: Odometer
-    grade: OdometerGrade
-    receiver: Receiver
-    tuning: CredibleTuning
-    rule: AuxiliaryRule
-    onset: float
-    horizon: int
-
-    @property
-    def timeline(self) -> Timeline:  # type: ignore[override]
-        """The epochs of the game."""
-        return Timeline.steady(self.onset, self.receiver.interval, self.horizon)
-
-    @property
-    def bias_sigma(self) -> Floats:
-        """Data-sheet bias of the IMU, (6,), rad/s and m/s²."""
-        return IMU_BIAS
-
-    @property
-    def fix_sigma(self) -> float:
-        """Of the receiver's whole error per horizontal axis, 1 sigma, m."""
-        return math.hypot(self.receiver.white_sigma[0], self.receiver.markov_sigma[0])
-
-    @property
-    def facts(self) -> FilterFacts:
-        """What the designer of the filter knows."""
-        speed = 0.0 if self.data == "static" else SPEED
-        drift = self.grade.drift_sigma(speed, self.receiver.interval, self.horizon * self.receiver.interval)
-        return FilterFacts(
-            self.name,
-            self.timeline.interval,
-            self.bias_sigma,
-            self.offers,
-            self.linear_model,
-            self.fix_sigma,
-            drift,
-        )
-
-    def times(self, burn_in: int) -> Floats:
-        """Scenario time of the epochs -burn_in..K, s."""
-        start = self.onset - burn_in * self.receiver.interval
-        return Timeline.steady(start, self.receiver.interval, self.horizon + burn_in).times
-
-    @kept_by_burn_in
-    def motion(self, burn_in: int = 0) -> PlanarMotion:
-        """The truth at the odometer's samples, from one interval before epoch -burn_in on."""
-        steps = (burn_in + 1 + self.horizon) * self.tuning.samples
-        start = self.onset - (burn_in + 1) * self.receiver.interval
-        times: Floats = start + self.odometer.step * np.arange(steps + 1, dtype=np.float64)
-        return standstill(times) if self.data == "static" else rectangle(times, self.odometer.step)
-
-    def _at_epochs(self, samples: Floats) -> Floats:
-        """Of planar samples those at the epochs, with a zero height, (E, 3)."""
-        chosen = samples[self.tuning.samples :: self.tuning.samples]
-        return np.column_stack([chosen, np.zeros(len(chosen))])
-
-    def velocity(self, burn_in: int = 0) -> Floats:
-        """The true velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s."""
-        return self._at_epochs(self.motion(burn_in).velocity)
-
-    def track(self) -> Floats:
-        """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
-        position = self._at_epochs(self.motion().position)
-        return position - position[0]
-
-    @kept_by_burn_in
-    def linear_model(self, burn_in: int = 0) -> LinearModel:
-        """What offsets do to the filter from epoch -burn_in on, every fix used: exact."""
-        return credible_linear_model(self.tuning, self.rule.anchoring != "free", self.times(burn_in))
-
-    def navigator(
-        self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
-    ) -> CredibleNavigator:
-        """A navigator whose model starts ``burn_in`` epochs before epoch 0; arguments as in `Scenario`."""
-        self.check_fidelity(fidelity)
-        model = CredibleModel(
-            motion=self.motion(burn_in), odometer=self.odometer, grade=self.grade, tuning=self.tuning, rule=self.rule
-        )
-        return CredibleNavigator(model, num_runs, slices, demands)
-
-    @cached_property
-    def _start(self) -> Floats:
-        return standing_start(self.tuning, self.receiver)
-
-    def draw_initial(self, runs: Runs, burn_in: int, streams: RunStreams) -> Floats:
-        """Joint states of filter and receiver after a long standstill, (n, 30)."""
-        initial = np.zeros((len(runs), NUM_JOINT))
-        normals = np.stack([streams(run, "initial").standard_normal(NUM_JOINT) for run in runs])
-        for j in np.flatnonzero(self._start.any(axis=0)):
-            initial += normals[:, j, None] * self._start[:, j]
-        return initial
-
-    def draw_receiver_noise(self, runs: Runs, initial: Floats, burn_in: int, streams: RunStreams) -> Floats:
-        """Receiver noise of the epochs -burn_in..K, (n, burn_in + K + 1, 3), m."""
-        epochs = burn_in + self.horizon + 1
-        return np.stack(
-            [
-                draw_noise(self.receiver, epochs, streams(run, "receiver"), initial[place, COLOUR])
-                for place, run in enumerate(runs)
-            ]
-        )
+PATHS: dict[str, tuple[Callable[[Floats, float], PlanarMotion], float]] = {
+    "rectangle": (rectangle, SPEED),
+    "static": (standstill, 0.0),
+}
+"""The motion and its speed, m/s, by ``data``."""
 
 
 def song_robot(
@@ -244,7 +110,7 @@ def song_robot(
     credit: int = 5,
     horizon: int = 300,
     onset: float = 0.0,
-) -> SongRobot:
+) -> Scenario:
     """The robot as a game from ``onset`` on; the paper's attacks begin at 150 s, or at 50 and 150 s.
 
     Args:
@@ -266,7 +132,7 @@ def song_robot(
         ValueError: an unknown name, or a number out of range.
     """
     owner = "song-robot"
-    validation.one_of(owner, "data", data, DATA)
+    validation.one_of(owner, "data", data, tuple(PATHS))
     validation.one_of(owner, "noise", noise, NOISES)
     validation.one_of(owner, "odometer", odometer, tuple(GRADES))
     sigma = validation.between(owner, "sigma", sigma, *SIGMAS)
@@ -281,36 +147,55 @@ def song_robot(
     white = sigma if noise == "white" else WHITE_SHARE * sigma
     slow = 0.0 if noise == "white" else math.sqrt(1.0 - WHITE_SHARE**2) * sigma
     encoders, receiver_rate = Odometer(), 1.0
-    return SongRobot(
-        name=spell(
-            owner,
-            data=None if data == "rectangle" else data,
-            noise=None if noise == "markov" else noise,
-            sigma=None if sigma == SIGMA else sigma,
-            odometer=None if odometer == "set-a" else odometer,
-            auxiliary=None if auxiliary == "anchored" else auxiliary,
-            credit=None if credit == 5 else rule.credit,
-            horizon=None if horizon == 300 else horizon,
-            onset=None if onset == 0.0 else onset,
-        ),
-        data=data,
-        odometer=encoders,
-        grade=odometer_grade(odometer),
-        receiver=Receiver(
-            rate=receiver_rate,
-            white_sigma=(white, white, sigma),
-            markov_sigma=(slow, slow, 0.0),
-            markov_time=0.0 if noise == "white" else MARKOV_TIME,
-        ),
-        tuning=CredibleTuning(
-            step=encoders.step,
-            samples=round(encoders.rate / receiver_rate),
-            acceleration=ACCELERATION * sigma,
-            auxiliary_sigma=AUXILIARY * sigma,
-            fix_sigma=sigma,
-            height_sigma=sigma,
-        ),
-        rule=rule,
+    name = spell(
+        owner,
+        data=None if data == "rectangle" else data,
+        noise=None if noise == "markov" else noise,
+        sigma=None if sigma == SIGMA else sigma,
+        odometer=None if odometer == "set-a" else odometer,
+        auxiliary=None if auxiliary == "anchored" else auxiliary,
+        credit=None if credit == 5 else rule.credit,
+        horizon=None if horizon == 300 else horizon,
+        onset=None if onset == 0.0 else onset,
+    )
+    receiver = Receiver(
+        rate=receiver_rate,
+        white_sigma=(white, white, sigma),
+        markov_sigma=(slow, slow, 0.0),
+        markov_time=0.0 if noise == "white" else MARKOV_TIME,
+    )
+    tuning = CredibleTuning(
+        step=encoders.step,
+        samples=round(encoders.rate / receiver_rate),
+        acceleration=ACCELERATION * sigma,
+        auxiliary_sigma=AUXILIARY * sigma,
+        fix_sigma=sigma,
+        height_sigma=sigma,
+    )
+    path, speed = PATHS[data]
+    truth = PlanarTruth(
+        name=name,
+        path=path,
+        speed=speed,
+        interval=receiver.interval,
+        step=encoders.step,
+        samples=tuning.samples,
         onset=onset,
         horizon=horizon,
+    )
+    family = CredibleFamily(
+        truth=truth,
+        odometer=encoders,
+        grade=odometer_grade(odometer),
+        receiver=receiver,
+        tuning=tuning,
+        rule=rule,
+        imu_bias=IMU_BIAS,
+    )
+    return Scenario(
+        family=family,
+        drag_off_rate=(SPEED, SPEED, SPEED),
+        error_scale=5.0,
+        defender_scale=1.0,
+        depth_table=DEPTHS,
     )

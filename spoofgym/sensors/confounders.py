@@ -46,20 +46,20 @@ class Confounders:
     Attributes:
         available: whether there is a fix at epochs 0..K, (N, K+1); always at epoch 0.
         multipath: whether a burst is in force, (N, K+1).
-        noise: of the bursts, (N, K+1, m), m; zero in the velocity.
+        noise: of the bursts, in the position of a fix, (N, K+1, 3), m.
     """
 
     def __init__(self, disturbances: Disturbances) -> None:
         """Keep how often and how strongly."""
         self.disturbances = disturbances
 
-    def bind(self, timeline: Timeline, num_runs: int, dimension: int) -> None:
+    def bind(self, timeline: Timeline, num_runs: int) -> None:
         """Allocate the episodes of ``num_runs`` runs."""
         epochs = timeline.num_epochs + 1
         self._timeline = timeline
         self.available = np.ones((num_runs, epochs), dtype=bool)
         self.multipath = np.zeros((num_runs, epochs), dtype=bool)
-        self.noise: Floats = np.zeros((num_runs, epochs, dimension))
+        self.noise: Floats = np.zeros((num_runs, epochs, 3))
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the disturbances of new episodes: blocks of a fixed size, whatever becomes of them."""
@@ -74,7 +74,7 @@ class Confounders:
                 stretch = self._stretch(draws[4], draws[5], given.multipath_duration)
                 low, high = given.multipath_sigma
                 self.multipath[run, stretch] = True
-                self.noise[run, stretch, :3] = (low + draws[6] * (high - low)) * normals[stretch]
+                self.noise[run, stretch] = (low + draws[6] * (high - low)) * normals[stretch]
 
     def _stretch(self, place: float, length: float, duration: tuple[float, float]) -> slice:
         """Epochs of a disturbance that begins at any of them after epoch 0 and may last beyond the end."""

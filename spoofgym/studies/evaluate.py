@@ -21,7 +21,7 @@ from typing import Any
 from rich.console import Console, RenderableType
 
 from spoofgym.attacks import make_attack
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
@@ -31,13 +31,14 @@ from spoofgym.evaluation.defenders import POPULATIONS, check_names, evaluate_def
 from spoofgym.evaluation.matrix_games import ATTACKS, Matrix
 from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.policies.classical import parse
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.program import do_all, give_json, program
-from spoofgym.scenario import FIDELITIES, Scenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.recorded_family import RecordedFamily
 from spoofgym.studies.defenders_presentation import defenders_figure, defenders_tables
 from spoofgym.studies.matrix_presentation import curves_figure, matrix_figure, matrix_tables
 from spoofgym.studies.notes import tell_what_is_new
@@ -144,8 +145,8 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     if options.defender:
         return _defenders(options, scenario, fidelity, terminal)
     given = options.detector or ["snapshot"]
-    detectors = [calibrated(make_detector(name), scenario, fidelity) for name in given]
-    if isinstance(scenario, RecordedScenario):
+    detectors = calibrated_for_play([make_detector(name) for name in given], scenario, fidelity)
+    if isinstance(scenario.family, RecordedFamily):
         return _recorded(options, scenario, detectors)
     policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
     if options.shadow is not None:
@@ -216,7 +217,6 @@ def _recorded(options: argparse.Namespace, scenario: Scenario, detectors: list[D
         raise ValueError("a recorded log is evaluated with --attack; --attacker needs a simulated scenario")
     if options.figure is not None:
         raise ValueError("--figure draws attackers in a simulated scenario; a recorded log gives a table and JSON")
-    assert isinstance(scenario, RecordedScenario)
     attacks = [make_attack(text) for text in options.attack or ["ramp:0.5"]]
     return recorded_report(scenario, detectors, evaluate_recorded(scenario, attacks, detectors))
 

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from spoofgym.calibration import calibrated_all
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, above_one, add_json
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
@@ -38,7 +38,8 @@ def threshold_rows(scenario: Scenario, detectors: Sequence[str], arl0s: Sequence
     rows = []
     for arl0 in arl0s:
         asked = [make_detector(at_arl0(text, arl0)) for text in detectors]
-        for text, detector in zip(detectors, calibrated_all(asked, scenario), strict=True):
+        ready = calibrated_for_play(asked, scenario, scenario.fidelities[0])
+        for text, detector in zip(detectors, ready, strict=True):
             rows.append(_row(text, arl0, detector))
     return sorted(rows, key=lambda row: detectors.index(row["detector"]))
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from rich.table import Table
 
-from spoofgym.calibration import calibrated
+from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
@@ -94,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     wrong_shadows(scenario)  # refuses a scenario without them before a threshold is looked for
-    detectors = [calibrated(make_detector(options.detector), scenario)]
+    detectors = calibrated_for_play([make_detector(options.detector)], scenario, "linear")
     threshold = exact_threshold(scenario, detectors)
     if threshold is None:
         raise ValueError(

@@ -7,7 +7,7 @@ import pytest
 
 from spoofgym.attacks import AttackPool, make_attack
 from spoofgym.navigation.interface import Clock
-from spoofgym.scenario import SimulatedScenario
+from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation
@@ -68,7 +68,7 @@ def test_a_pool_shows_its_members_the_model():
         np.testing.assert_array_equal(pool.offsets[run], expected)
 
 
-class WithoutModel(SimulatedScenario):
+class WithoutModel(LooseFamily):
     """As a recorded log: no linear model."""
 
     offers = ()
@@ -77,16 +77,16 @@ class WithoutModel(SimulatedScenario):
 @pytest.mark.parametrize("name", ["noise-matched", "tracking-error:noise-matched"])
 def test_a_scenario_without_a_linear_model_is_refused(name):
     flight = make_scenario(SHORT)
-    given = {field: getattr(flight, field) for field in SimulatedScenario.__dataclass_fields__}
+    given = {field: getattr(flight.family, field) for field in LooseFamily.__dataclass_fields__}
     with pytest.raises(ValueError, match=f"attack '{name}' needs linear model, which scenario 'liu-flight:horizon=20'"):
-        Simulation(WithoutModel(**given), make_attack(name))
+        Simulation(replace(flight, family=WithoutModel(**given)), make_attack(name))
 
 
 def test_fixes_with_a_velocity_are_refused():
     flight = make_scenario(SHORT)
-    sigmas = (*flight.tuning.measurement_sigma, 0.1, 0.1, 0.1)
+    sigmas = (*flight.family.tuning.measurement_sigma, 0.1, 0.1, 0.1)
     receiver = Receiver(rate=1.0, white_sigma=sigmas[:3], velocity_sigma=(0.1, 0.1, 0.1))
-    six = replace(flight, receiver=receiver, tuning=replace(flight.tuning, measurement_sigma=sigmas))
+    six = flight.changed(receiver=receiver, tuning=replace(flight.family.tuning, measurement_sigma=sigmas))
     with pytest.raises(ValueError, match=r"'noise-matched' exists only for position fixes \(m = 3\).* m = 6"):
         Simulation(six, make_attack("noise-matched"))
 

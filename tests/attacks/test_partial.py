@@ -97,7 +97,7 @@ def test_it_can_be_a_member_of_a_pool_and_have_a_tracking_error():
     assert pool.needs_ranges
     simulation = Simulation(FLIGHT, pool, num_runs=60, seed=0)
     simulation.reset()
-    satellites = FLIGHT.satellites(np.full(60, 5), 0)
+    satellites = FLIGHT.family.satellites(np.full(60, 5), 0)
     taken = pool.captured(Clock(np.full(60, 5), np.full(60, 62.5)), satellites)
     assert set(pool.member.tolist()) == {-1, 0, 1, 2}
     np.testing.assert_array_equal(taken[pool.member == 0], satellites[pool.member == 0] == 10)

@@ -17,11 +17,11 @@ INSIDE = "ramp:0.5/direction=135"
 def flight():
     """The Liu flight with a receiver that gives velocity, too."""
     plain = make_scenario("liu-flight:horizon=40")
-    return replace(
-        plain,
+    receiver, tuning = plain.family.receiver, plain.family.tuning
+    return plain.changed(
         name="with velocity",
-        receiver=replace(plain.receiver, velocity_sigma=SIGMA),
-        tuning=replace(plain.tuning, measurement_sigma=(*plain.tuning.measurement_sigma, *SIGMA)),
+        receiver=replace(receiver, velocity_sigma=SIGMA),
+        tuning=replace(tuning, measurement_sigma=(*tuning.measurement_sigma, *SIGMA)),
     )
 
 

@@ -265,12 +265,12 @@ def test_objects_that_their_name_does_not_build_stay_in_memory(place):
         """A user's class that keeps the name of its base."""
 
     scenario = make_scenario(SCENARIO)
-    other = dataclasses.replace(scenario, horizon=25)
+    other = scenario.changed(horizon=25)
     assert other.name == scenario.name
     assert calibration_cache.spelled_out_scenario(scenario)
     assert calibration_cache.spelled_out_scenario(dataclasses.replace(scenario))
     assert not calibration_cache.spelled_out_scenario(other)
-    assert not calibration_cache.spelled_out_scenario(dataclasses.replace(scenario, name="unheard-of"))
+    assert not calibration_cache.spelled_out_scenario(scenario.changed(name="unheard-of"))
     assert calibrated(Own(3, arl0=50.0), scenario).calibrated
     assert calibrated(make_detector("windowed:n=4,arl0=50"), other).calibrated
     assert not place.exists()

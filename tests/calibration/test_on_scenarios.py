@@ -4,7 +4,6 @@ Statistical bands: a correct program fails each with a probability below 1e-7 (n
 deviations, 2e-9, where no exact distribution is at hand).
 """
 
-import dataclasses
 import math
 
 import numpy as np
@@ -216,7 +215,7 @@ def test_a_threshold_of_another_scenario_is_calibrated_anew(monkeypatch):
 def test_two_scenarios_of_one_name_have_thresholds_of_their_own(monkeypatch):
     monkeypatch.setattr(calibration, "_KNOWN", {})
     base = make_scenario("liu-flight:horizon=20")
-    bold = dataclasses.replace(base, tuning=FilterTuning(measurement_sigma=(1.85, 1.85, 3.0)))
+    bold = base.changed(tuning=FilterTuning(measurement_sigma=(1.85, 1.85, 3.0)))
     assert base.name == bold.name
     detector = make_detector("windowed:n=5,arl0=100")
     assert calibrated(detector, bold).threshold > 1.5 * calibrated(detector, base).threshold

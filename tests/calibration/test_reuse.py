@@ -1,6 +1,5 @@
 """Thresholds of re-use, measured while the filter coasts."""
 
-import dataclasses
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ FLIGHT = "liu-flight:imu=tactical"
 def over_stated():
     """The filter believes in three times the noise of this receiver."""
     receiver = Receiver(white_sigma=(3.7 / 3.0, 3.7 / 3.0, 2.0))
-    return dataclasses.replace(make_scenario(FLIGHT), name="over-stated", receiver=receiver)
+    return make_scenario(FLIGHT).changed(name="over-stated", receiver=receiver)
 
 
 def test_a_matched_filter_coasts_with_the_chi_square_quantile():

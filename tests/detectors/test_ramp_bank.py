@@ -19,10 +19,10 @@ SIGMA = (0.2, 0.3, 0.4)
 
 def with_velocity(scenario):
     """The scenario with a receiver that gives velocity, too."""
-    return dataclasses.replace(
-        scenario,
-        receiver=dataclasses.replace(scenario.receiver, velocity_sigma=SIGMA),
-        tuning=dataclasses.replace(scenario.tuning, measurement_sigma=(*scenario.tuning.measurement_sigma[:3], *SIGMA)),
+    receiver, tuning = scenario.family.receiver, scenario.family.tuning
+    return scenario.changed(
+        receiver=dataclasses.replace(receiver, velocity_sigma=SIGMA),
+        tuning=dataclasses.replace(tuning, measurement_sigma=(*tuning.measurement_sigma[:3], *SIGMA)),
     )
 
 

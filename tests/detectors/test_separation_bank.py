@@ -255,7 +255,7 @@ def test_the_separation_and_the_coasting_err_as_much_as_the_bank_believes():
 def white(detector, runs, epochs, seed, scenario=FLIGHT):
     """Statistics (epochs, N) of white innovations, the burn-in left out."""
     ready(detector, runs, scenario)
-    generator, white_innovations, kept = np.random.default_rng(seed), scenario.white_innovations(), []
+    generator, white_innovations, kept = np.random.default_rng(seed), scenario.family.white_innovations(), []
     for k in range(-detector.memory, epochs):
         innovation = white_innovations.innovation(k, generator.standard_normal((runs, scenario.dimension)))
         index = np.full(runs, k)
@@ -327,7 +327,7 @@ def test_recovery_goes_to_the_beginning_of_the_last_window_that_closed_clean():
     """Without noise: a jump is in all open windows, and no window closes clean while it is; then new ones do."""
     n, detector = 5, SeparationBank(5)
     ready(detector, 2)
-    innovations, depths = FLIGHT.white_innovations(), []
+    innovations, depths = FLIGHT.family.white_innovations(), []
     for k in range(-4, 20):
         whitened = np.zeros((2, FLIGHT.dimension))
         whitened[1] = 50.0 if k == 6 else 0.0
@@ -345,7 +345,7 @@ def test_recovery_goes_to_the_beginning_of_the_last_window_that_closed_clean():
 def test_a_reset_closes_the_windows_of_single_runs():
     generator = np.random.default_rng(4)
     whitened = generator.standard_normal((30, 3, FLIGHT.dimension))
-    innovations = FLIGHT.white_innovations()
+    innovations = FLIGHT.family.white_innovations()
     together = ready(SeparationBank(8), 3)
     fresh = None
     for k in range(30):
@@ -394,7 +394,7 @@ def test_the_strapdown_fidelity_separates_alike():
 
 
 def test_epochs_that_another_memory_adds_are_not_seen():
-    detector, innovations = ready(SeparationBank(4), 2), FLIGHT.white_innovations()
+    detector, innovations = ready(SeparationBank(4), 2), FLIGHT.family.white_innovations()
     other = copy.copy(detector)
     other.bind(2, FLIGHT.dimension)
     generator = np.random.default_rng(1)

@@ -20,10 +20,10 @@ POSITION = slice(6, 8)
 
 def with_velocity(scenario):
     """The scenario with a receiver that gives velocity, too."""
-    return dataclasses.replace(
-        scenario,
-        receiver=dataclasses.replace(scenario.receiver, velocity_sigma=SIGMA),
-        tuning=dataclasses.replace(scenario.tuning, measurement_sigma=(*scenario.tuning.measurement_sigma[:3], *SIGMA)),
+    receiver, tuning = scenario.family.receiver, scenario.family.tuning
+    return scenario.changed(
+        receiver=dataclasses.replace(receiver, velocity_sigma=SIGMA),
+        tuning=dataclasses.replace(tuning, measurement_sigma=(*tuning.measurement_sigma[:3], *SIGMA)),
     )
 
 

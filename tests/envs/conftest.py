@@ -2,29 +2,25 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 
 import pytest
 
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.tight_scenario import TightScenario
 
 FLIGHT = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
 
 
 @lru_cache(maxsize=8)
-def flight_under(hour: float, mask: float) -> TightScenario:
+def flight_under(hour: float, mask: float) -> Scenario:
     """The short Kujur flight at an hour of the constellation's day, with an elevation mask in degrees."""
-    flight = make_scenario(FLIGHT)
-    assert isinstance(flight, TightScenario)
-    return replace(
-        flight, name=f"flight at {hour:g} h above {mask:g} degrees", mask=math.radians(mask), start_time=3600.0 * hour
-    )
+    name = f"flight at {hour:g} h above {mask:g} degrees"
+    return make_scenario(FLIGHT).changed(name=name, mask=math.radians(mask), start_time=3600.0 * hour)
 
 
 @pytest.fixture
-def under() -> Callable[[float, float], TightScenario]:
+def under() -> Callable[[float, float], Scenario]:
     """The flight under a sky.
 
     (4.0, 5.0): eight satellites; (8.5, 15.0): seven, of which one sets; (9.5, 25.0): five, of which one sets; (10.7,

@@ -10,7 +10,7 @@ from spoofgym.envs.shadow import shadow_model
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.spoofer_seat import INNOVATION_UNIT
 from spoofgym.optimum import expected_play
-from spoofgym.scenario import SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
 SHORT = "liu-flight:horizon=12"
@@ -18,10 +18,8 @@ WRONG = ["liu-flight:horizon=12,imu=tactical", "liu-flight:horizon=12,sigma=7.4"
 DEAF = "snapshot:threshold=1000"
 
 
-def short_flight() -> SimulatedScenario:
-    scenario = make_scenario(SHORT)
-    assert isinstance(scenario, SimulatedScenario)
-    return scenario
+def short_flight() -> Scenario:
+    return make_scenario(SHORT)
 
 
 def rates(epochs: int) -> np.ndarray:
@@ -101,11 +99,10 @@ def test_another_timeline_is_refused(shadow: str, message: str) -> None:
 def test_another_dimension_is_refused() -> None:
     flight = short_flight()
     sigma = (0.1, 0.1, 0.1)
-    richer = replace(
-        flight,
+    richer = flight.changed(
         name="with velocity",
-        receiver=replace(flight.receiver, velocity_sigma=sigma),
-        tuning=replace(flight.tuning, measurement_sigma=(*flight.tuning.measurement_sigma, *sigma)),
+        receiver=replace(flight.family.receiver, velocity_sigma=sigma),
+        tuning=replace(flight.family.tuning, measurement_sigma=(*flight.family.tuning.measurement_sigma, *sigma)),
     )
     with pytest.raises(ValueError, match=r"'with velocity' does not fit .*: dimension of the fix: 6 instead of 3"):
         shadow_model(flight, richer)

@@ -17,7 +17,7 @@ from spoofgym.envs.config import ACTIONS, KNOWLEDGE
 from spoofgym.envs.observation import spoofer_fields
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.spoofer_seat import INNOVATION_UNIT
-from spoofgym.scenario import FIDELITIES
+from spoofgym.navigation.family import FIDELITIES
 
 ID = "spoofgym/Spoofer-v0"
 PREFIXED_ID = f"spoofgym:{ID}"

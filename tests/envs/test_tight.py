@@ -18,8 +18,8 @@ from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import SpooferVectorEnv
 from spoofgym.navigation.tight.states import POSITION
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.tight_scenario import TightScenario
 
 SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
 KUJUR = "kujur-flight:horizon=40,onset=60"
@@ -29,7 +29,7 @@ DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
 QUIET: dict[str, Any] = {"attacks": "none", "outage": 0.0, "multipath": 0.0}
 
-Under = Callable[[float, float], TightScenario]
+Under = Callable[[float, float], Scenario]
 
 
 # --- both environments ------------------------------------------------------------------------------------------------
@@ -56,7 +56,7 @@ def test_coupling_is_written_into_the_specification(kind: type[Any]) -> None:
     assert argued.game.scenario.name == spelled.game.scenario.name == "liu-flight:horizon=12,coupling=tight"
     np.testing.assert_array_equal(argued.reset(seed=3)[0], spelled.reset(seed=3)[0])
     assert kind(scenario=SHORT, coupling="tight", **given).game.scenario.name == SHORT
-    assert kind(scenario=SHORT, coupling="loose", **given).game.scenario.coupling == "loose"
+    assert kind(scenario=SHORT, coupling="loose", **given).game.scenario.family.coupling == "loose"
     with pytest.raises(ValueError, match=r"'foi-drive' is loosely coupled, not tightly.*: kujur-flight, liu-flight"):
         kind(scenario="foi-drive", coupling="tight", **given)
     with pytest.raises(ValueError, match="tightly coupled, not loosely"):
@@ -151,7 +151,7 @@ def test_kappa_is_that_of_the_model(scenario: str, sigma: float) -> None:
     nothing = np.zeros(env.action_space.shape)
     told = env.step(nothing)[4]["kappa"]
     played = make_scenario(scenario)
-    if played.coupling == "tight":
+    if played.family.coupling == "tight":
         model = played.tight_model()
         dynamics = model.dynamics
         observation = np.zeros((dynamics.dimension, dynamics.num_states))

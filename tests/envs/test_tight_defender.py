@@ -1,7 +1,6 @@
 """Defender-v0 on ranges: single satellites that are left out, masks, protection levels."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -14,9 +13,9 @@ from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender import DefenderEnv
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_seat import EXCLUDE
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
-from spoofgym.tight_scenario import TightScenario
 
 SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
 KUJUR = "kujur-flight:horizon=40,onset=60"
@@ -26,7 +25,7 @@ DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
 QUIET: dict[str, Any] = {"attacks": "none", "outage": 0.0, "multipath": 0.0}
 
-Under = Callable[[float, float], TightScenario]
+Under = Callable[[float, float], Scenario]
 
 
 def defender(lanes: int, seed: int = 5, **arguments: Any) -> DefenderGame:
@@ -240,7 +239,7 @@ def test_code_residuals_are_standard_normal_in_a_clean_game() -> None:
 def test_protection_levels_are_those_of_filter_and_detectors() -> None:
     """Over the alert limits of the scenario: up for a bank of heights, horizontal for the others."""
     detectors = ("snapshot", "separation-bank:n=30", "separation-bank:n=30,direction=horizontal", "kujur-monitor:n=30")
-    scenario = replace(make_scenario(KUJUR), name="narrow", alert_limits=(80.0, 40.0))  # type: ignore[type-var]
+    scenario = make_scenario(KUJUR).changed(name="narrow", alert_limits=(80.0, 40.0))
     game = defender(3, scenario=scenario, detectors=detectors, attacks="ramp:2", clean=0.0)
     running = list(game.simulation.detectors.values())
     limits = {running[1].name: 40.0, running[2].name: 80.0, running[3].name: 40.0}

@@ -19,7 +19,6 @@ from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
-from spoofgym.tight_scenario import TightScenario
 
 KUJUR = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
 LIU = "liu-flight:horizon=40,onset=60,coupling=tight,drag_off_rate=4"
@@ -29,7 +28,7 @@ SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0), REUSED]
 USE = Decision(np.ones(1, dtype=bool))
 CLOCK_ALONE = np.array([0.0, 0.0, 0.0, 1.0])
 
-Under = Callable[[float, float], TightScenario]
+Under = Callable[[float, float], Scenario]
 
 
 def game(scenario: str | Scenario, lanes: int, seed: int = 7, **arguments: Any) -> SpooferGame:
@@ -48,9 +47,9 @@ def actions(epochs: int) -> Floats:
 class SilentVictim:
     """A victim without any noise or error of its own, whose ranges the scenario spoofs."""
 
-    def __init__(self, scenario: TightScenario) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        self.navigator = scenario.navigator("linear", Demands(), 0, 1, RunSlices(1))
+        self.navigator = scenario.family.navigator("linear", Demands(), 0, 1, RunSlices(1))
         assert isinstance(self.navigator, TightNavigator)
         assert not self.navigator.normals.any()
         self.offset = np.zeros((1, 4))
@@ -62,7 +61,7 @@ class SilentVictim:
         rate = (offset - self.offset) / self.scenario.timeline.interval
         spoof = Spoof(offset[None, :3], rate[:, :3], offset[None, 3], rate[:, 3])
         self.navigator.propagate()
-        innovation = self.navigator.innovate(self.scenario.spoofed("linear", following, 0, spoof))
+        innovation = self.navigator.innovate(self.scenario.family.spoofed("linear", following, 0, spoof))
         self.whitened = innovation.in_position.whitened[0]
         self.navigator.resolve(USE)
         self.offset = offset[None]
@@ -78,7 +77,6 @@ class SilentVictim:
 def test_the_shadow_is_the_victim_without_noise(sky: Any, under: Under) -> None:
     """All states, the last innovation, and the coming one where the offset is held; with range rates, too."""
     scenario = make_scenario(LIU) if sky == "liu" else under(*sky)
-    assert isinstance(scenario, TightScenario)
     present = scenario.tight_model().dynamics.present
     assert sky in ((4.0, 5.0), "liu") or present.any(axis=0).sum() > present.all(axis=0).sum()
     played, victim = game(scenario, 1), SilentVictim(scenario)

@@ -14,7 +14,7 @@ import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.envs.checker import check_vector_env
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
-from spoofgym.tight_scenario import TightScenario
+from spoofgym.scenario import Scenario
 
 SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
 KUJUR = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
@@ -24,7 +24,7 @@ DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
 QUIET: dict[str, Any] = {"attacks": "none", "outage": 0.0, "multipath": 0.0}
 
-Under = Callable[[float, float], TightScenario]
+Under = Callable[[float, float], Scenario]
 
 
 def slow_or_fast(vector: VectorEnv) -> np.ndarray:

@@ -189,7 +189,7 @@ def test_random_takes_fixes_back(world, played):
     expected = played["random"]
     again = play_random(world, EPISODES, SEED)
     np.testing.assert_array_equal(again.error, expected.error)
-    flat = replace(world.scenario, depth_table=(0,) * len(world.scenario.depth_table))
+    flat = world.scenario.changed(depth_table=(0,) * len(world.scenario.depth_table))
     shallow = play_random(replace(world, scenario=flat), EPISODES, SEED)
     np.testing.assert_array_equal(shallow.excluded, expected.excluded)
     assert not np.array_equal(shallow.error, expected.error)

@@ -105,7 +105,7 @@ def test_no_reference_no_clean_error(tmp_path: Path) -> None:
 
 def test_the_error_between_fixes_continues_that_at_the_fixes(folder: Path) -> None:
     scenario = recorded(str(folder))
-    assert scenario.log.reference is not None
+    assert scenario.family.log.reference is not None
     errors = held_out_errors(scenario, 40.0)
     assert errors is not None
     assert len(errors) == 476  # 10 Hz without every fifth, from 40 s to before the last fix

@@ -12,7 +12,7 @@ import numpy as np
 from spoofgym.attacks import ATTACKS, make_attack
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses import RESPONSES, make_response
-from spoofgym.scenario import Scenario, SimulatedScenario
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from tests.golden.parts import detectors_for, fits, ready, spelled
@@ -123,16 +123,15 @@ def attacked(name: str) -> Arrays:
     else:
         first = 300 if attack.onset is None else round(attack.onset) - 5
         made = make_scenario(f"liu-flight:horizon=120,onset={first}")
-        assert isinstance(made, SimulatedScenario)
         scenario = _with_velocity(made) if attack.needs_velocity else made
     played = trace(Simulation(scenario, attack, (), None, RUNS, SEED), epochs=20)
     return {name: played[name] for name in ("offset", "error", "nis")}
 
 
-def _with_velocity(scenario: SimulatedScenario) -> Scenario:
+def _with_velocity(scenario: Scenario) -> Scenario:
     sigma = (0.1, 0.1, 0.1)
-    tuning = replace(scenario.tuning, measurement_sigma=scenario.tuning.measurement_sigma + sigma)
-    return replace(scenario, receiver=replace(scenario.receiver, velocity_sigma=sigma), tuning=tuning)
+    tuning = replace(scenario.family.tuning, measurement_sigma=scenario.family.tuning.measurement_sigma + sigma)
+    return scenario.changed(receiver=replace(scenario.family.receiver, velocity_sigma=sigma), tuning=tuning)
 
 
 def episodes() -> dict[str, Callable[[], Arrays]]:

@@ -12,6 +12,7 @@ from spoofgym.geodesy import position_difference
 from spoofgym.logs.clock_steps import MILLISECOND, _spikes, find_steps, without_steps
 from spoofgym.logs.range_fixes import solve_ranges
 from spoofgym.logs.ranges_log import read_ranges
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.simulation import Simulation
@@ -22,9 +23,9 @@ TURNS = 4
 OUTAGE = (70, 90)
 
 
-def tight(folder: Path, **options: object) -> RecordedRanges:
+def tight(folder: Path, **options: object) -> Scenario:
     scenario = recorded(str(folder), coupling="tight", **options)
-    assert isinstance(scenario, RecordedRanges)
+    assert isinstance(scenario.family, RecordedRanges)
     return scenario
 
 
@@ -42,7 +43,7 @@ def steady(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[int, int], Re
 
 def largest_difference(one: RecordedRanges, other: RecordedRanges) -> float:
     """Of the filters' positions at the epochs of two drives, m."""
-    return float(np.abs(position_difference(one.clean.position, other.clean.position)).max())
+    return float(np.abs(position_difference(one.family.clean.position, other.family.clean.position)).max())
 
 
 MILLISECONDS = [
@@ -61,7 +62,7 @@ def test_whole_milliseconds_do_not_move_the_filter(clock: Clock, tmp_path: Path,
     """The size of such a step is known. Tags are written to a nanosecond, in which satellites move by a micrometre."""
     scenario = tight(written(tmp_path / "log", clock))
     assert largest_difference(scenario, steady[0, 0]) < 0.01
-    assert not scenario.epochs.clock_jump.any()
+    assert not scenario.family.epochs.clock_jump.any()
 
 
 OTHERS = [
@@ -95,7 +96,7 @@ def test_a_step_of_the_ranges_that_the_tags_do_not_show(size: float, tmp_path: P
 
 def test_a_steady_clock_has_no_steps(steady) -> None:
     """140 steps of standard normal noise at 8 sigma, 140 rates at 12: false failure below 1e-12."""
-    ranges = read_ranges(steady[0, 0].log.folder)
+    ranges = read_ranges(steady[0, 0].family.log.folder)
     steps = find_steps(solve_ranges(ranges, START))
     assert not any(values.any() for values in (steps.offset, steps.rate, steps.variance))
     again = without_steps(ranges, START)
@@ -162,7 +163,7 @@ def test_a_clock_that_begins_anew_is_in_the_model_of_the_game_too(tmp_path: Path
     scenario = tight(written(tmp_path / "log", Clock(steps=((60, 1e-4),))), onset=FIRST + 50.0, horizon=30)
     model = scenario.tight_model()
     after = model.covariance - np.swapaxes(model.whitened_gain, 1, 2) @ model.whitened_gain
-    navigated = scenario.clean.covariance[scenario.first + 1 : scenario.last + 2]
+    navigated = scenario.family.clean.covariance[scenario.family.first + 1 : scenario.family.last + 2]
     np.testing.assert_allclose(after, navigated, rtol=1e-5, atol=1e-8 * navigated.max())
 
 

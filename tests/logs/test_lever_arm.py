@@ -58,7 +58,7 @@ def write(folder: Path, notes: str) -> Path:
 
 def errors(folder: Path) -> np.ndarray:
     scenario = recorded(str(folder))
-    return position_difference(scenario.clean.position[1:], scenario.true_position)[20:]
+    return position_difference(scenario.family.clean.position[1:], scenario.family.true_position)[20:]
 
 
 def test_the_filter_knows_where_the_antenna_is(tmp_path: Path) -> None:
@@ -70,13 +70,13 @@ def test_the_filter_knows_where_the_antenna_is(tmp_path: Path) -> None:
 
 def test_velocities_become_those_of_the_imu(tmp_path: Path) -> None:
     scenario = recorded(str(write(tmp_path / "log", "antenna_lever_arm_m = [3.0, 1.0, -2.0]\n")))
-    assert scenario.log.fixes.velocity is not None
-    assert scenario.log.reference is not None
-    assert scenario.log.reference.velocity is not None
+    assert scenario.family.log.fixes.velocity is not None
+    assert scenario.family.log.reference is not None
+    assert scenario.family.log.reference.velocity is not None
     antenna = read_log(tmp_path / "log").fixes.velocity
-    assert np.abs(antenna - scenario.log.reference.velocity).max() > 0.4
+    assert np.abs(antenna - scenario.family.log.reference.velocity).max() > 0.4
     # 3.7 m at 0.37 rad/s with 9 degrees of bank, and the noise
-    assert np.abs(scenario.log.fixes.velocity - scenario.log.reference.velocity).max() < 0.35
+    assert np.abs(scenario.family.log.fixes.velocity - scenario.family.log.reference.velocity).max() < 0.35
 
 
 def test_a_tightly_coupled_filter_says_that_it_knows_none(tmp_path: Path) -> None:
@@ -85,4 +85,4 @@ def test_a_tightly_coupled_filter_says_that_it_knows_none(tmp_path: Path) -> Non
     notes.write_text(notes.read_text() + "antenna_lever_arm_m = [3.0, 4.0, 0.0]\n")
     with pytest.warns(LogWarning, match="coupling=tight does not know antenna_lever_arm_m .* by up to 5.0 m"):
         scenario = recorded(str(tmp_path / "log"), coupling="tight")
-    np.testing.assert_array_equal(scenario.log.lever_arm, np.zeros(3))
+    np.testing.assert_array_equal(scenario.family.log.lever_arm, np.zeros(3))

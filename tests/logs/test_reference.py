@@ -92,12 +92,13 @@ def test_a_game_goes_on_in_a_hole(tmp_path: Path) -> None:
 
 def test_the_position_in_a_hole_joins_its_ends(tmp_path: Path) -> None:
     scenario = recorded(str(edited(tmp_path / "log", lambda time: not 60.0 < time < 100.0)))
-    truth = recorded(str(write_log(tmp_path / "whole"))).true_position
-    metres = (scenario.true_position - truth) * [6.37e6, 4.5e6, 1.0]
-    np.testing.assert_array_equal(np.flatnonzero(~scenario.compared), np.flatnonzero(np.abs(metres).max(axis=1) > 1e-6))
+    truth = recorded(str(write_log(tmp_path / "whole"))).family.true_position
+    metres = (scenario.family.true_position - truth) * [6.37e6, 4.5e6, 1.0]
+    hole = np.abs(metres).max(axis=1) > 1e-6
+    np.testing.assert_array_equal(np.flatnonzero(~scenario.family.compared), np.flatnonzero(hole))
     assert np.abs(metres).max() < 2.0
-    assert np.abs(metres[~scenario.compared][[0, -1]]).max() < 1.0
-    assert np.all(np.isfinite(scenario.true_velocity))
+    assert np.abs(metres[~scenario.family.compared][[0, -1]]).max() < 1.0
+    assert np.all(np.isfinite(scenario.family.true_velocity))
 
 
 def test_a_reference_that_begins_or_ends_within_the_game(tmp_path: Path) -> None:
@@ -207,4 +208,4 @@ def test_a_reference_on_another_clock_is_told(tmp_path: Path, late: float, shift
 def test_a_good_reference_is_not(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        _ = recorded(str(write_log(tmp_path / "log"))).clean
+        _ = recorded(str(write_log(tmp_path / "log"))).family.clean

@@ -32,7 +32,7 @@ STILL = ImuGrade(
 
 
 def flight(adaptation, noise="white", **changes):
-    return dataclasses.replace(make_scenario(f"shadmehri-flight:noise={noise}"), adaptation=adaptation, **changes)
+    return make_scenario(f"shadmehri-flight:noise={noise}").changed(adaptation=adaptation, **changes)
 
 
 class Oracle:
@@ -205,8 +205,8 @@ def test_r_follows_the_noise_of_the_receiver(share):
     A tenth is ten of them; what Q makes of the mean is within it.
     """
     base = flight(Adaptation(guard="non-cumulative"))
-    sigma = tuple(share * value for value in base.receiver.white_sigma)
-    scenario = dataclasses.replace(base, receiver=dataclasses.replace(base.receiver, white_sigma=sigma))
+    sigma = tuple(share * value for value in base.family.receiver.white_sigma)
+    scenario = base.changed(receiver=dataclasses.replace(base.family.receiver, white_sigma=sigma))
     _, simulation = course(scenario, 400, epochs=150)
     learnt = np.diagonal(simulation.navigator.tuned.noise.mean(axis=0))
     np.testing.assert_allclose(learnt, np.square(sigma), rtol=0.1)
@@ -240,7 +240,7 @@ def test_a_fix_left_out_or_reset_to_does_not_enter_the_windows(fidelity):
         simulation.observe()
     tuned = simulation.navigator.tuned
     assert tuned.count.tolist() == [10, 0, 0]
-    initial = simulation.scenario.tuning.measurement_covariance
+    initial = simulation.scenario.family.tuning.measurement_covariance
     assert not np.array_equal(tuned.noise[0], initial)
     np.testing.assert_array_equal(tuned.noise[1:], np.stack([initial, initial]))
 
@@ -278,14 +278,14 @@ def test_fixes_taken_back_are_as_if_they_had_been_left_out(fidelity):
 
 def test_a_new_episode_has_learnt_nothing():
     scenario = flight(Adaptation(window=5, guard="hold"))
-    navigator = scenario.navigator("linear", EXCLUDES, 0, 2, RunSlices(1))
+    navigator = scenario.family.navigator("linear", EXCLUDES, 0, 2, RunSlices(1))
     runs, streams = np.arange(2), RunStreams.from_seed(0, 2)
     for _ in range(2):
-        initial = scenario.draw_initial(runs, 0, streams)
+        initial = scenario.family.draw_initial(runs, 0, streams)
         navigator.reset(runs, initial, streams)
         assert navigator.tuned.count.tolist() == [0, 0]
         assert navigator.tuned.scale.tolist() == [1.0, 1.0]
-        np.testing.assert_array_equal(navigator.tuned.noise[1], scenario.tuning.measurement_covariance)
+        np.testing.assert_array_equal(navigator.tuned.noise[1], scenario.family.tuning.measurement_covariance)
         for _ in range(8):
             navigator.propagate()
             navigator.innovate(np.full((2, 3), 4.0))

@@ -37,9 +37,9 @@ def band(degrees):
 def matched(**changes):
     """The Liu flight with a filter that also starts with the truth's own uncertainty: its model is exact."""
     base = liu_flight(onset=ONSET, horizon=HORIZON)
-    sigma = changes.pop("sigma", base.tuning.measurement_sigma)
-    tuning = dataclasses.replace(base.tuning, initial_scale=1.0, measurement_sigma=sigma)
-    scenario = dataclasses.replace(base, tuning=tuning, **changes)
+    sigma = changes.pop("sigma", base.family.tuning.measurement_sigma)
+    tuning = dataclasses.replace(base.family.tuning, initial_scale=1.0, measurement_sigma=sigma)
+    scenario = base.changed(tuning=tuning, **changes)
     assert scenario.matched
     return scenario
 
@@ -63,8 +63,8 @@ def true_error(simulation, scenario):
     navigator = simulation.navigator
     if hasattr(navigator, "state"):
         return navigator.state.copy()
-    sample = round(simulation.epoch.time[0] * scenario.trajectory.rate)
-    truth = scenario.trajectory
+    sample = round(simulation.epoch.time[0] * scenario.truth.trajectory.rate)
+    truth = scenario.truth.trajectory
     # C_hat = (I - [φ x]) C, so C C_hat' = I + [φ x]
     turned = np.einsum("ij,nkj->nik", truth.attitude[sample], navigator.attitude)
     error = np.empty((len(turned), 15))
@@ -81,7 +81,7 @@ def play(scenario, fidelity, runs, seed):
     simulation = Simulation(scenario, num_runs=runs, seed=seed, fidelity=fidelity)
     simulation.reset()
     nis = []
-    for _ in range(scenario.horizon):
+    for _ in range(scenario.truth.horizon):
         simulation.resolve()
         nis.append(simulation.observe().innovation.nis)
     simulation.resolve()
@@ -154,7 +154,7 @@ def test_the_band_sees_a_lever_arm_that_the_filter_does_not_know():
 
 def rising():
     """Fixes from ranges, two of whose satellites give way to others after half a minute."""
-    noise = range_fix_along(KUJUR, gps_24(), liu_flight().trajectory, 1.0)
+    noise = range_fix_along(KUJUR, gps_24(), liu_flight().truth.trajectory, 1.0)
     slots = noise.white.shape[2]
     started = noise.started.copy()
     for slot in (1, 3):
@@ -178,11 +178,11 @@ MISMATCHED = {
 def test_joint_covariance_predicts_the_errors_of_a_mismatched_filter(name, fidelity):
     """Played from power-on, compared with the recursion to the same epoch. 15 variances and the NEES, 2e-8 each."""
     epochs = 60
-    base = dataclasses.replace(liu_flight(), **MISMATCHED[name])
-    scenario = dataclasses.replace(base, onset=2.0, horizon=epochs)
-    later = dataclasses.replace(base, onset=3.0 + epochs, horizon=1)
+    base = liu_flight().changed(**MISMATCHED[name])
+    scenario = base.changed(onset=2.0, horizon=epochs)
+    later = base.changed(onset=3.0 + epochs, horizon=1)
     assert not scenario.matched
-    joint = later.warm_start().joint_covariance[ERROR, ERROR]
+    joint = later.family.warm_start().joint_covariance[ERROR, ERROR]
     _, error, _ = play(scenario, fidelity, RUNS[fidelity], 42)
     sigma = np.sqrt(np.diag(joint))
     low, high = band(len(error))
@@ -197,8 +197,8 @@ def test_joint_covariance_predicts_the_errors_of_a_mismatched_filter(name, fidel
 @pytest.mark.parametrize("name", MISMATCHED)
 def test_the_filters_own_covariance_is_another_one(name):
     """So that the test above has something to tell."""
-    scenario = dataclasses.replace(liu_flight(), **MISMATCHED[name], onset=63.0, horizon=1)
-    warm = scenario.warm_start()
+    scenario = liu_flight().changed(**MISMATCHED[name], onset=63.0, horizon=1)
+    warm = scenario.family.warm_start()
     ratio = np.diag(warm.joint_covariance)[:15] / np.diag(warm.filter_covariance)
     low, high = band(RUNS["linear"])
     assert np.any((ratio < low) | (ratio > high))

@@ -51,14 +51,14 @@ def carry(attitude, velocity, position, force, errors, step, noise):
 
 def common_noise(scenario, strapdown, linear, initial):
     """Give the linear runs the noise that the strapdown runs of seed SEED are going to draw."""
-    trajectory, model, streams = scenario.trajectory, strapdown.model, RunStreams.from_seed(SEED, RUNS)
+    trajectory, model, streams = scenario.truth.trajectory, strapdown.model, RunStreams.from_seed(SEED, RUNS)
     samples = model.max_samples
-    first = round((scenario.onset - scenario.receiver.interval) * trajectory.rate)
+    first = round((scenario.truth.onset - scenario.family.receiver.interval) * trajectory.rate)
     decay = model.instability_decay
     for run in range(RUNS):
         generator = streams(run, "imu").spawn(1)[0]
         drift = initial[run, 15:21].copy()
-        for k in range(scenario.horizon + 1):
+        for k in range(scenario.truth.horizon + 1):
             normals, more = np.empty((samples, 6)), np.empty(9)
             generator.standard_normal(out=normals)
             generator.standard_normal(out=more)
@@ -74,7 +74,7 @@ def common_noise(scenario, strapdown, linear, initial):
                 1.0 / trajectory.rate,
                 noise,
             )
-            noise[6:] += np.sqrt(scenario.receiver.interval) * model.true_noise[6:] * more[:3]
+            noise[6:] += np.sqrt(scenario.family.receiver.interval) * model.true_noise[6:] * more[:3]
             linear.normals[run, k] = solve_triangular(linear.model.noise_factor[k], noise, lower=True)
             if linear.bias_steps.shape[1]:
                 moved = decay * drift + np.sqrt(1.0 - decay**2) * model.instability_sigma * more[3:]
@@ -90,16 +90,16 @@ def play(scenario, attack, excludes=False, out=range(0)):
     """
     slices = RunSlices(1)
     demands = Demands(excludes=excludes)
-    pair = [scenario.navigator(fidelity, demands, 0, RUNS, slices) for fidelity in ("strapdown", "linear")]
+    pair = [scenario.family.navigator(fidelity, demands, 0, RUNS, slices) for fidelity in ("strapdown", "linear")]
     runs, streams = np.arange(RUNS), RunStreams.from_seed(SEED, RUNS)
-    initial = scenario.draw_initial(runs, 0, streams)
-    noise = scenario.draw_receiver_noise(runs, initial, 0, streams)
+    initial = scenario.family.draw_initial(runs, 0, streams)
+    noise = scenario.family.draw_receiver_noise(runs, initial, 0, streams)
     attack.bind(scenario.timeline, RUNS)
     for navigator in pair:
         navigator.reset(runs, initial, streams)
     common_noise(scenario, *pair, initial)
     error, whitened, nis = [], [], []
-    for k in range(scenario.horizon + 1):
+    for k in range(scenario.truth.horizon + 1):
         deviation = noise[:, k].copy()
         offset = attack.offset(Clock(np.full(RUNS, k), np.full(RUNS, scenario.times(0)[k])))
         deviation[:, :3] += offset
@@ -155,9 +155,9 @@ def test_the_noise_is_what_makes_them_agree(ramp):
     """With noise of its own the linear run differs by its sigma, so the agreement above is no matter of course."""
     scenario, error, *_ = ramp
     runs, streams = np.arange(RUNS), RunStreams.from_seed(SEED, RUNS)
-    initial = scenario.draw_initial(runs, 0, streams)
-    noise = scenario.draw_receiver_noise(runs, initial, 0, streams)
-    own = scenario.navigator("linear", Demands(), 0, RUNS, RunSlices(1))
+    initial = scenario.family.draw_initial(runs, 0, streams)
+    noise = scenario.family.draw_receiver_noise(runs, initial, 0, streams)
+    own = scenario.family.navigator("linear", Demands(), 0, RUNS, RunSlices(1))
     own.reset(runs, initial, streams)
     for k in range(60):
         own.propagate()
@@ -170,8 +170,8 @@ def test_the_noise_is_what_makes_them_agree(ramp):
 
 def variant(**changes):
     base = liu_flight(horizon=100, onset=640.0)  # through the turn that begins at 680 s
-    sigma = changes.pop("sigma", base.tuning.measurement_sigma)
-    return dataclasses.replace(base, tuning=dataclasses.replace(base.tuning, measurement_sigma=sigma), **changes)
+    sigma = changes.pop("sigma", base.family.tuning.measurement_sigma)
+    return base.changed(tuning=dataclasses.replace(base.family.tuning, measurement_sigma=sigma), **changes)
 
 
 VARIANTS = {
@@ -183,7 +183,7 @@ VARIANTS = {
     "latency": lambda: variant(
         receiver=Receiver(velocity_sigma=(0.1, 0.1, 0.2), latency=0.2), sigma=(3.7, 3.7, 6.0, 0.1, 0.1, 0.2)
     ),
-    "five-hertz": lambda: variant(receiver=Receiver(rate=5.0)),
+    "five-hertz": lambda: variant(receiver=Receiver(rate=5.0), rate=5.0),
     "unstable-bias": lambda: variant(grade=grade("tactical")),
 }
 

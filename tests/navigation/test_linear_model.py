@@ -52,7 +52,8 @@ def van_loan(dynamics, density, step):
 
 def test_van_loans_series_is_pyins(flight):
     """The oracle of the next test against that of pyins (whose expm is slow beside other threads)."""
-    dynamics, density = dense_dynamics(flight.trajectory, 16_050), np.diag(flight.tuning.noise_density(flight.grade))
+    density = np.diag(flight.family.tuning.noise_density(flight.family.grade))
+    dynamics = dense_dynamics(flight.truth.trajectory, 16_050)
     (transition,), (noise,) = van_loan(dynamics[None], density, 0.01)
     expected, added = compute_process_matrices(dynamics, density, 0.01)
     np.testing.assert_allclose(transition, expected, atol=1e-15)
@@ -65,10 +66,11 @@ def test_an_epoch_is_the_product_of_van_loans_exponentials(flight, epoch):
 
     Measured: Φ within 1e-10 of its largest elements (10 m/s per rad/s), Q within 4e-4.
     """
-    dynamics, trajectory = flight._dynamics, flight.trajectory
+    dynamics, trajectory = flight.family.dynamics, flight.truth.trajectory
     samples = np.array([dense_dynamics(trajectory, i) for i in range(epoch * 100, (epoch + 1) * 100)])
     transition, noise = np.eye(15), np.zeros((15, 15))
-    for one, added in zip(*van_loan(samples, np.diag(flight.tuning.noise_density(flight.grade)), 0.01), strict=True):
+    density = np.diag(flight.family.tuning.noise_density(flight.family.grade))
+    for one, added in zip(*van_loan(samples, density, 0.01), strict=True):
         transition = one @ transition
         noise = one @ noise @ one.T + added
     np.testing.assert_allclose(dynamics.transition[epoch], transition, atol=1e-9)
@@ -81,9 +83,9 @@ def test_an_epoch_is_the_product_of_van_loans_exponentials(flight, epoch):
 
 def test_one_exponential_is_not_enough_in_a_turn(flight):
     """The product differs from the exponential of the mean F by far more than the tolerance above."""
-    mean = np.mean([dense_dynamics(flight.trajectory, i) for i in range(17_000, 17_100)], axis=0)
+    mean = np.mean([dense_dynamics(flight.truth.trajectory, i) for i in range(17_000, 17_100)], axis=0)
     (single,), _ = van_loan(mean[None] / 8.0, np.zeros((15, 15)), 1.0)
-    difference = np.abs(np.linalg.matrix_power(single, 8) - flight._dynamics.transition[170])[3:6, 9:12].max()
+    difference = np.abs(np.linalg.matrix_power(single, 8) - flight.family.dynamics.transition[170])[3:6, 9:12].max()
     assert difference > 1e-3
 
 
@@ -126,10 +128,8 @@ TUNING = FilterTuning(initial_scale=2.0, process_noise_scale=1.7, measurement_si
 def simulated():
     """4000 plain simulations of 40 epochs from power-on: every noise drawn by itself; gains by a dense recursion."""
     base = liu_flight(onset=60.0, horizon=1)
-    scenario = dataclasses.replace(
-        base, grade=UNSTABLE, receiver=COLOURED, tuning=TUNING, true_position_random_walk=0.05
-    )
-    dynamics, count, runs = scenario._epochs(0, 40), 40, 4000
+    scenario = base.changed(grade=UNSTABLE, receiver=COLOURED, tuning=TUNING, true_position_random_walk=0.05)
+    dynamics, count, runs = scenario.family.epochs(0, 40), 40, 4000
     rng = np.random.default_rng(8)
     covariance = np.diag((TUNING.initial_scale * TUNING.initial_sigma(UNSTABLE)) ** 2)
     constant = UNSTABLE.bias_sigma * rng.standard_normal((runs, 6))
@@ -197,8 +197,8 @@ def test_the_filters_own_covariance_would_not_pass(simulated):
 
 def test_joint_and_filter_agree_where_the_model_is_exact():
     base = liu_flight(onset=300.0, horizon=1)
-    scenario = dataclasses.replace(base, tuning=dataclasses.replace(base.tuning, initial_scale=1.0))
-    warm = scenario.warm_start()
+    scenario = base.changed(tuning=dataclasses.replace(base.family.tuning, initial_scale=1.0))
+    warm = scenario.family.warm_start()
     sigma = np.sqrt(np.diag(warm.filter_covariance))
     np.testing.assert_allclose(
         warm.joint_covariance[ERROR, ERROR] / np.outer(sigma, sigma),
@@ -207,7 +207,8 @@ def test_joint_and_filter_agree_where_the_model_is_exact():
     )
     assert not warm.joint_covariance[INSTABILITY].any()
     assert not warm.joint_covariance[COLOUR].any()
-    np.testing.assert_allclose(np.diag(warm.joint_covariance[CONSTANT_BIAS, CONSTANT_BIAS]), base.grade.bias_sigma**2)
+    variance = np.diag(warm.joint_covariance[CONSTANT_BIAS, CONSTANT_BIAS])
+    np.testing.assert_allclose(variance, base.family.grade.bias_sigma**2)
 
 
 def test_factor_of_definite_and_singular_matrices():

@@ -15,7 +15,7 @@ import pytest
 
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.cache import ScenarioCache, array_bytes
-from spoofgym.scenarios.recorded_scenario import RecordedScenario
+from spoofgym.scenarios.recorded_family import RecordedFamily
 from tests.scenarios.test_recorded import write_log
 
 SPEC = "shadmehri-flight:speed={},onset=5"
@@ -105,8 +105,8 @@ def test_a_log_that_is_cut_replaced_by_an_archive_or_removed(log: Path) -> None:
     assert epochs(f"recorded:{log}") < whole
     (log / "reference.csv").unlink()
     scenario = make_scenario(f"recorded:{log}")
-    assert isinstance(scenario, RecordedScenario)
-    assert scenario.log.reference is None
+    assert isinstance(scenario.family, RecordedFamily)
+    assert scenario.family.log.reference is None
     shutil.rmtree(log)
     with pytest.raises(ValueError, match="is no folder"):
         make_scenario(f"recorded:{log}")
@@ -132,4 +132,4 @@ def test_a_link_that_points_elsewhere_is_another_log(log: Path, tmp_path: Path) 
     assert make_scenario(f"recorded:{link}") is first
     link.unlink()
     link.symlink_to(other)
-    assert make_scenario(f"recorded:{link}").log.reference is None  # type: ignore[attr-defined]
+    assert make_scenario(f"recorded:{link}").family.log.reference is None  # type: ignore[attr-defined]

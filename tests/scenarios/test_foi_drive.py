@@ -47,9 +47,8 @@ def test_the_game():
     assert make_scenario("liu-flight").defender_scale == 50.0
     np.testing.assert_allclose(scenario.bias_sigma[[0, 3]], [np.radians(0.1) / 3600.0, 50e-6 * 9.80665])
     tactical = make_scenario("foi-drive:imu=tactical")
-    np.testing.assert_allclose(
-        tactical.bias_sigma, np.sqrt(tactical.grade.bias_sigma**2 + tactical.grade.instability_sigma**2)
-    )
+    grade = tactical.family.grade
+    np.testing.assert_allclose(tactical.bias_sigma, np.sqrt(grade.bias_sigma**2 + grade.instability_sigma**2))
 
 
 @pytest.mark.parametrize(
@@ -121,10 +120,10 @@ def nine_states(scenario, use):
     The drive starts with the first transition; ``use`` says which fixes the filter uses.
     """
     epochs = round(scenario.timeline.end)
-    dynamics, tuning = scenario._dynamics, scenario.tuning
+    dynamics, tuning = scenario.family.dynamics, scenario.family.tuning
     sigma = np.concatenate([tuning.attitude_sigma, tuning.velocity_sigma, tuning.position_sigma])
     covariance = np.diag((tuning.initial_scale * sigma) ** 2)
-    density = np.repeat([scenario.grade.noise_density[0], scenario.grade.noise_density[3]], 3) ** 2
+    density = np.repeat([scenario.family.grade.noise_density[0], scenario.family.grade.noise_density[3]], 3) ** 2
     assert np.allclose(np.diag(dynamics.process_noise[0])[:6], tuning.process_noise_scale * density, rtol=0.01)
     noise = np.eye(3) * tuning.measurement_sigma[0] ** 2
     priors = []
@@ -172,7 +171,7 @@ def nine_states_from_the_motion(scenario, use):
     φ' = -ω × φ,  v' = f × φ - 2 ω × v + gravity's gradient,  p' = v; ω is the earth's rate at the start, and the
     earth is flat but for that.
     """
-    truth, tuning, step = scenario.trajectory, scenario.tuning, 1.0 / scenario.trajectory.rate
+    truth, tuning, step = scenario.truth.trajectory, scenario.family.tuning, 1.0 / scenario.truth.trajectory.rate
     latitude = truth.position[0, 0]
     spin = cross(7.292115e-5 * np.array([0.0, np.cos(latitude), np.sin(latitude)]))
     gyro, accelerometer = np.radians(0.012) / 60.0, 120e-6 * 9.80665
@@ -250,11 +249,11 @@ def test_without_bias_states_the_truth_still_has_biases():
     """The true errors of 4000 starts: bias errors as the data sheet says, chi-square with 4000 degrees per axis."""
     scenario = make_scenario("foi-drive:bias_states=false")
     with_states = make_scenario("foi-drive")
-    factor = scenario.warm_start(0).joint_factor
+    factor = scenario.family.warm_start(0).joint_factor
     variance = np.sum(factor[9:15] ** 2, axis=1)
     np.testing.assert_allclose(np.sqrt(variance), scenario.bias_sigma, rtol=1e-9)
-    assert np.all(scenario.warm_start(0).filter_covariance[9:15] == 0.0)
-    assert np.sum(with_states.warm_start(0).filter_covariance[9:15, 9:15] ** 2) > 0.0
+    assert np.all(scenario.family.warm_start(0).filter_covariance[9:15] == 0.0)
+    assert np.sum(with_states.family.warm_start(0).filter_covariance[9:15, 9:15] ** 2) > 0.0
     nis, _ = play("foi-drive:bias_states=false", 300, "linear", 230)
     assert nis.sum() > chi2.isf(FALSE_FAILURE, 3 * nis.size)
 

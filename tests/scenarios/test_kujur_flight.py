@@ -22,7 +22,7 @@ def test_the_flight_is_the_papers():
 
 def test_default_is_tight_and_half_a_second():
     scenario = make_scenario("kujur-flight:horizon=20,onset=60")
-    assert scenario.coupling == "tight"
+    assert scenario.family.coupling == "tight"
     assert scenario.timeline.interval == 0.5
     assert scenario.dimension == 2 * scenario.slots
 
@@ -45,8 +45,8 @@ def test_loose_coupling_takes_fixes_from_the_same_sky():
     """R by hand: the variances of all errors of a range, from the elevations that the tight filter sees."""
     loose, tight = make_scenario(LOOSE), make_scenario("kujur-flight:horizon=20,onset=60")
     assert loose.name == LOOSE
-    assert (loose.coupling, loose.dimension, loose.matched) == ("loose", 3, False)
-    sky, epoch = tight.geometry, 119
+    assert (loose.family.coupling, loose.dimension, loose.matched) == ("loose", 3, False)
+    sky, epoch = tight.family.geometry, 119
     elevation, present = sky.elevation[epoch], sky.present[epoch]
     shell = 1.0 / np.sqrt(1.0 - (6378136.3 / 6728136.3 * np.cos(elevation)) ** 2)
     mapping = 1.001 / np.sqrt(0.002001 + np.sin(elevation) ** 2)
@@ -54,7 +54,7 @@ def test_loose_coupling_takes_fixes_from_the_same_sky():
     weight = present / (own + (0.09 * mapping) ** 2)
     to_fix = projection(sky.line_of_sight[[epoch]], present[None], weight[None])[0, :3]
     variance = np.sum(to_fix**2 * own, axis=1) + (to_fix @ (0.09 * mapping)) ** 2
-    np.testing.assert_allclose(loose.tuning.measurement_sigma, np.sqrt(variance), rtol=1e-9)
+    np.testing.assert_allclose(loose.family.tuning.measurement_sigma, np.sqrt(variance), rtol=1e-9)
 
 
 @pytest.mark.parametrize("fidelity", ["linear", "strapdown"])
@@ -66,8 +66,9 @@ def test_errors_of_the_loose_filter_have_the_joint_covariance(fidelity):
     simulation.reset()
     simulation.resolve()
     # R differs by the turn of the sky in half a second
-    np.testing.assert_allclose(later.tuning.measurement_sigma, scenario.tuning.measurement_sigma, rtol=1e-3)
-    expected = np.diag(later.warm_start().joint_covariance)[6:9]
+    here, there = (part.family.tuning.measurement_sigma for part in (scenario, later))
+    np.testing.assert_allclose(there, here, rtol=1e-3)
+    expected = np.diag(later.family.warm_start().joint_covariance)[6:9]
     low, high = chi2.ppf([5e-9, 1.0 - 5e-9], runs) / runs
     ratio = np.mean(simulation.error**2, axis=0) / expected
     assert np.all((0.99 * low < ratio) & (ratio < 1.01 * high))
@@ -87,7 +88,7 @@ def test_a_run_is_the_same_in_any_batch():
 
 
 def test_the_hour_turns_the_sky():
-    noon, midnight = (make_scenario(f"{LOOSE},hour={hour}").tuning.measurement_sigma for hour in (12, 0))
+    noon, midnight = (make_scenario(f"{LOOSE},hour={hour}").family.tuning.measurement_sigma for hour in (12, 0))
     assert np.abs(np.subtract(noon, midnight)).max() > 0.1
 
 

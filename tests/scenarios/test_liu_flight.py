@@ -15,7 +15,7 @@ from spoofgym.simulation import Simulation
 def test_default_is_the_papers() -> None:
     scenario = liu_flight()
     assert scenario.name == "liu-flight"
-    assert scenario.receiver.white_sigma == scenario.tuning.measurement_sigma == (3.7, 3.7, 6.0)
+    assert scenario.family.receiver.white_sigma == scenario.family.tuning.measurement_sigma == (3.7, 3.7, 6.0)
     assert make_scenario("liu-flight:sigma=3.7").name == "liu-flight"
 
 
@@ -25,13 +25,13 @@ def test_receiver_and_filter_have_the_sigma_alike(sigma: float) -> None:
     assert scenario.name == f"liu-flight:horizon=20,sigma={sigma}"
     assert scenario.matched
     vertical = sigma * 6.0 / 3.7
-    np.testing.assert_allclose(scenario.receiver.white_deviation, [sigma, sigma, vertical], rtol=1e-12)
+    np.testing.assert_allclose(scenario.family.receiver.white_deviation, [sigma, sigma, vertical], rtol=1e-12)
     measured = np.sqrt(np.diag(scenario.linear_model().measurement_covariance))
     np.testing.assert_allclose(measured, [sigma, sigma, vertical], rtol=1e-12)
 
 
 def test_coloured_noise_keeps_the_ratio_of_the_axes() -> None:
-    east, north, up = liu_flight(sigma=7.4, markov_sigma=2.0, markov_time=30.0).receiver.markov_sigma
+    east, north, up = liu_flight(sigma=7.4, markov_sigma=2.0, markov_time=30.0).family.receiver.markov_sigma
     assert east == north == 2.0
     assert up == pytest.approx(2.0 * 6.0 / 3.7, rel=1e-12)
 
@@ -47,9 +47,9 @@ def test_fixes_from_ranges_keep_the_filter() -> None:
     scenario = make_scenario("liu-flight:horizon=20,noise=ranges")
     assert scenario.name == "liu-flight:horizon=20,noise=ranges"
     assert not scenario.matched
-    assert scenario.tuning.measurement_sigma == (3.7, 3.7, 6.0)
-    whole = np.sqrt(np.diag(scenario.ranges.covariance(800)))
-    white = np.sqrt(np.diag(scenario.ranges.white_covariance(800)))
+    assert scenario.family.tuning.measurement_sigma == (3.7, 3.7, 6.0)
+    whole = np.sqrt(np.diag(scenario.family.ranges.covariance(800)))
+    white = np.sqrt(np.diag(scenario.family.ranges.white_covariance(800)))
     assert np.all((whole > [2.0, 2.0, 4.0]) & (whole < [5.0, 5.0, 9.0]))
     budget = np.array([0.67, 0.94, 0.5, 4.0, 0.2])
     np.testing.assert_allclose(white / whole, np.linalg.norm(budget[:2]) / np.linalg.norm(budget), rtol=1e-9)
@@ -61,7 +61,7 @@ def test_the_filters_bound_is_broken_without_an_attack() -> None:
     The share of runs beyond three sigma is that of a normal; 1000 runs, binomial band, 1e-8.
     """
     scenario = make_scenario("liu-flight:horizon=5,noise=ranges")
-    warm = scenario.warm_start()
+    warm = scenario.family.warm_start()
     own, true = (np.sqrt(c[6, 6]) for c in (warm.filter_covariance, warm.joint_covariance))
     assert own < 0.8 < 2.0 < true
     simulation = Simulation(scenario, num_runs=1000, seed=4)
@@ -76,7 +76,7 @@ def test_the_filters_bound_is_broken_without_an_attack() -> None:
 def test_tight_coupling_takes_the_ranges_themselves() -> None:
     scenario = make_scenario("liu-flight:horizon=20,onset=60,coupling=tight")
     assert scenario.name == "liu-flight:horizon=20,onset=60,coupling=tight"
-    assert (scenario.coupling, scenario.dimension) == ("tight", 2 * scenario.slots)
+    assert (scenario.family.coupling, scenario.dimension) == ("tight", 2 * scenario.slots)
     assert scenario.tight_model().num_epochs == 20
 
 
@@ -97,11 +97,11 @@ def test_options_that_do_not_go_together(options: str, message: str) -> None:
 
 def test_ranges_must_cover_the_game_and_give_no_velocity() -> None:
     base = make_scenario("liu-flight:horizon=20,noise=ranges")
-    ranges = base.ranges
+    ranges = base.family.ranges
     short = dataclasses.replace(ranges, mapping=ranges.mapping[:700])
     with pytest.raises(ValueError, match="ranges have 700 epochs, the game needs 820"):
-        dataclasses.replace(base, ranges=short)
+        base.changed(ranges=short)
     receiver = Receiver(white_sigma=ZERO, velocity_sigma=(0.1, 0.1, 0.1))
-    tuning = dataclasses.replace(base.tuning, measurement_sigma=(3.7, 3.7, 6.0, 0.1, 0.1, 0.1))
+    tuning = dataclasses.replace(base.family.tuning, measurement_sigma=(3.7, 3.7, 6.0, 0.1, 0.1, 0.1))
     with pytest.raises(ValueError, match="fixes from ranges are of position alone"):
-        dataclasses.replace(base, receiver=receiver, tuning=tuning)
+        base.changed(receiver=receiver, tuning=tuning)

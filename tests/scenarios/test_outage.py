@@ -65,7 +65,7 @@ def test_the_timeline_has_the_times_of_the_epochs(silent: Path) -> None:
     np.testing.assert_array_equal(scenario.timeline.times, scenario.times(0))
     assert scenario.timeline.interval == 1.0
     assert scenario.timeline.start == ONSET
-    assert scenario.timeline.end == scenario.epoch_time[-1] > 110.0
+    assert scenario.timeline.end == scenario.family.epoch_time[-1] > 110.0
 
 
 PROFILES = [
@@ -240,12 +240,13 @@ def test_ranges_every_two_seconds_are_gone_through_in_parts(tmp_path: Path) -> N
     kept = set(sorted({line.split(",")[1] for line in lines}, key=float)[::2])
     path.write_text("\n".join([header, *(line for line in lines if line.split(",")[1] in kept)]) + "\n")
     scenario = recorded(str(tmp_path / "log"), coupling="tight", horizon=20)
-    assert isinstance(scenario, RecordedRanges)
-    bounds, places = scenario.model.steps.bounds, scenario.model.steps.places
+    assert isinstance(scenario.family, RecordedRanges)
+    steps = scenario.family.model.steps
+    bounds, places = steps.bounds, steps.places
     np.testing.assert_array_equal(np.diff(places), 2)
-    lengths = np.add.reduceat(scenario.model.step, bounds[:-1])
+    lengths = np.add.reduceat(scenario.family.model.step, bounds[:-1])
     assert 0.97 < lengths.min() <= lengths.max() < 1.03
     model = scenario.tight_model()
     after = model.covariance - np.swapaxes(model.whitened_gain, 1, 2) @ model.whitened_gain
-    navigated = scenario.clean.covariance[scenario.first + 1 : scenario.last + 2]
+    navigated = scenario.family.clean.covariance[scenario.family.first + 1 : scenario.family.last + 2]
     np.testing.assert_allclose(after, navigated, rtol=1e-6, atol=1e-9 * navigated.max())

@@ -242,11 +242,11 @@ def test_fixes_from_ranges_need_ranges(folder: Path) -> None:
 
 def test_a_vertical_velocity_of_zero_throughout_is_not_believed(folder: Path) -> None:
     level = recorded(str(folder))
-    assert level.log.fixes.velocity is not None
-    rising = replace(level.log.fixes, velocity=level.log.fixes.velocity + np.array([0.0, 0.0, 0.1]))
+    assert level.family.log.fixes.velocity is not None
+    rising = replace(level.family.log.fixes, velocity=level.family.log.fixes.velocity + np.array([0.0, 0.0, 0.1]))
     sigma = [
-        np.sqrt(np.diagonal(scenario.model.measurement_covariance, axis1=1, axis2=2))
-        for scenario in (level, replace(level, log=replace(level.log, fixes=rising)))
+        np.sqrt(np.diagonal(scenario.family.model.measurement_covariance, axis1=1, axis2=2))
+        for scenario in (level, level.changed(log=replace(level.family.log, fixes=rising)))
     ]
     assert (sigma[0][:, 5] >= 100.0).all()
     assert (sigma[1][:, 5] < 1.0).all()
@@ -261,7 +261,8 @@ def test_a_phone_of_unknown_mounting(fixes: str) -> None:
     assert make_scenario(f"recorded:{PHONE},fixes={fixes}").name == scenario.name
     phone = read_log(PHONE).fixes
     gap = np.flatnonzero(np.diff(phone.time) > 1.5)
-    inside = (scenario.epoch_time > phone.time[gap[0] + 1] + 30.0) & (scenario.epoch_time < phone.time[gap[1]])
-    place, _ = interpolate(phone, scenario.epoch_time[inside])
-    error = position_difference(scenario.clean.position[1:][inside], place)
+    time = scenario.family.epoch_time
+    inside = (time > phone.time[gap[0] + 1] + 30.0) & (time < phone.time[gap[1]])
+    place, _ = interpolate(phone, time[inside])
+    error = position_difference(scenario.family.clean.position[1:][inside], place)
     assert np.median(np.hypot(error[:, 0], error[:, 1])) < 4.0

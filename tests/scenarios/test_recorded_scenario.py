@@ -55,7 +55,7 @@ def test_innovations_that_are_too_large_are_told(tmp_path: Path, name: str, chan
     folder = edit(write_log(tmp_path / "log", reference=False), name, change)
     scenario = recorded(str(folder))
     with pytest.warns(LogWarning, match=r"mean NIS .* per degree of freedom, .* line \d+ of gnss\.csv; likely") as seen:
-        assert scenario.clean.nis_per_degree(30) > 1.5
+        assert scenario.family.clean.nis_per_degree(30) > 1.5
     assert [str(warning.filename) for warning in seen] == [str(folder)]
 
 
@@ -64,7 +64,7 @@ def test_once_and_as_one_line(tmp_path: Path) -> None:
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("default")
         for onset in (50.0, 60.0):
-            assert recorded(str(folder), onset=onset).clean.nis.shape == (112,)
+            assert recorded(str(folder), onset=onset).family.clean.nis.shape == (112,)
     assert len(seen) == 1
     said = warnings.formatwarning(seen[0].message, seen[0].category, seen[0].filename, seen[0].lineno)
     assert said.startswith(f"{folder}:1: LogWarning: clean innovations are")
@@ -77,14 +77,14 @@ def test_the_sample_logs_give_no_reason_to_warn(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", LogWarning)
         scenario = recorded(str(DATA / name))
-        assert scenario.clean.nis_per_degree(0) < 1.0
+        assert scenario.family.clean.nis_per_degree(0) < 1.0
 
 
 def test_a_good_drive_with_ranges_gives_none(tmp_path: Path) -> None:
     write_drive(tmp_path / "log", turns=3)
     with warnings.catch_warnings():
         warnings.simplefilter("error", LogWarning)
-        assert 0.3 < recorded(str(tmp_path / "log"), coupling="tight").clean.nis_per_degree(0) < 1.3
+        assert 0.3 < recorded(str(tmp_path / "log"), coupling="tight").family.clean.nis_per_degree(0) < 1.3
 
 
 def test_fixes_that_stay_far_away_are_named(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_fixes_that_stay_far_away_are_named(tmp_path: Path) -> None:
 
     folder = edit(write_log(tmp_path / "log", reference=False), "gnss", far)
     with pytest.warns(LogWarning, match=r"the largest is .* at 63 s, line 62 of gnss\.csv"):
-        _ = recorded(str(folder)).clean
+        _ = recorded(str(folder)).family.clean
 
 
 def test_a_filter_that_is_lost_names_the_line(tmp_path: Path) -> None:
@@ -106,7 +106,7 @@ def test_a_filter_that_is_lost_names_the_line(tmp_path: Path) -> None:
     )
     edit(folder, "imu", lambda values: np.where((values[:, :1] > 77.0) & (np.arange(7) == 6), -9000.0, values))
     with pytest.raises(ValueError, match=r"diverges on this log; .* first too large at 113 s, line 69 of gnss\.csv"):
-        _ = recorded(str(folder)).clean
+        _ = recorded(str(folder)).family.clean
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from spoofgym.geodesy import position_difference
 from spoofgym.logs.log import interpolate, read_log
 from spoofgym.logs.ranges_log import read_ranges
 from spoofgym.navigation.tight.states import CLOCK
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_tight import RecordedRanges
@@ -29,9 +30,9 @@ PHONE = Path(__file__).parents[3] / "shared" / "data" / "car-phone-raw"
 ONSET = FIRST + 60.0
 
 
-def tight(folder: Path, **options: object) -> RecordedRanges:
+def tight(folder: Path, **options: object) -> Scenario:
     scenario = recorded(str(folder), coupling="tight", **options)
-    assert isinstance(scenario, RecordedRanges)
+    assert isinstance(scenario.family, RecordedRanges)
     return scenario
 
 
@@ -69,15 +70,15 @@ def exact(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_exact_ranges_give_the_true_motion_and_clock(exact: Path) -> None:
     """What is left are IMU noise and 3 ms of delay, found from the drive, at 12 m/s."""
     scenario = tight(exact)
-    assert scenario.epochs.geometry.time[0] - scenario.epochs.time[0] == pytest.approx(DELAY, abs=0.02)
-    settled = scenario.epoch_time > FIRST + 30.0
-    error = position_difference(scenario.clean.position[1:], scenario.true_position)[settled]
+    assert scenario.family.epochs.geometry.time[0] - scenario.family.epochs.time[0] == pytest.approx(DELAY, abs=0.02)
+    settled = scenario.family.epoch_time > FIRST + 30.0
+    error = position_difference(scenario.family.clean.position[1:], scenario.family.true_position)[settled]
     assert np.abs(error).max() < 0.4
-    ranges = scenario.ranges
+    ranges = scenario.family.ranges
     reference = ranges.clock[0] + ranges.clock_drift[0] * (ranges.time - ranges.time[0])
     # the first epoch is one second after the start of the drive
     truth = CLOCK_OFFSET + DRIFT * (ranges.geometry.time - FIRST - DELAY - 1.0)
-    np.testing.assert_allclose((reference + scenario.clean.state[1:, CLOCK] - truth)[settled], 0.0, atol=0.5)
+    np.testing.assert_allclose((reference + scenario.family.clean.state[1:, CLOCK] - truth)[settled], 0.0, atol=0.5)
 
 
 def test_white_noise_gives_the_innovations_that_the_filter_expects(folder: Path) -> None:
@@ -112,10 +113,10 @@ def test_a_pull_of_the_clock_moves_the_clock_alone(folder: Path) -> None:
 def test_the_model_of_the_game_has_the_covariances_of_the_clean_run(folder: Path) -> None:
     """The navigator forms its covariance run by run in its own code; the model by the recursion of the linear one."""
     scenario = tight(folder, onset=ONSET, horizon=60)
-    model, first = scenario.tight_model(10), scenario.first - 10
+    model, first = scenario.tight_model(10), scenario.family.first - 10
     for k in (0, 10, 70):
         after = model.covariance[k] - model.whitened_gain[k].T @ model.whitened_gain[k]
-        navigated = scenario.clean.covariance[first + k + 1]
+        navigated = scenario.family.clean.covariance[first + k + 1]
         np.testing.assert_allclose(after, navigated, rtol=1e-6, atol=1e-9 * navigated.max())
     with pytest.raises(ValueError, match="no linear model"):
         scenario.linear_model()
@@ -159,13 +160,13 @@ def test_windows_of_separation_know_the_ranges_before_the_game(folder: Path) -> 
 def test_silence_is_coasted_through_and_satellites_are_known_again(tmp_path: Path) -> None:
     write_drive(tmp_path / "log", silent=(80, 95), turns=5)
     scenario = tight(tmp_path / "log", onset=ONSET)
-    counted = scenario.ranges.geometry.present.sum(axis=1)
-    np.testing.assert_allclose(np.diff(scenario.epoch_time), 1.0, atol=1e-5)
+    counted = scenario.family.ranges.geometry.present.sum(axis=1)
+    np.testing.assert_allclose(np.diff(scenario.family.epoch_time), 1.0, atol=1e-5)
     silent = np.flatnonzero(counted == 0)
     assert len(silent) == 15
     assert (np.diff(silent) == 1).all()
-    assert not scenario.ranges.started[silent[-1] + 1 :].any()
-    sigma = np.sqrt(np.trace(scenario.clean.covariance[:, 6:9, 6:9], axis1=1, axis2=2))
+    assert not scenario.family.ranges.started[silent[-1] + 1 :].any()
+    sigma = np.sqrt(np.trace(scenario.family.clean.covariance[:, 6:9, 6:9], axis1=1, axis2=2))
     assert sigma[silent[-1] + 1] > 1.5 * sigma[silent[0]]
     _, seen = play(scenario)
     assert (seen["degrees"] == 0).sum() == 15
@@ -176,9 +177,9 @@ def test_silence_is_coasted_through_and_satellites_are_known_again(tmp_path: Pat
 def test_a_faulty_range_is_left_out(tmp_path: Path, folder: Path) -> None:
     write_drive(tmp_path / "log", fault=2000.0)
     whole, faulty = tight(folder), tight(tmp_path / "log")
-    lost = np.argwhere(whole.epochs.geometry.present & ~faulty.epochs.geometry.present)
+    lost = np.argwhere(whole.family.epochs.geometry.present & ~faulty.family.epochs.geometry.present)
     assert lost[:, 0].tolist() == [60]
-    assert np.abs(position_difference(faulty.clean.position[70], whole.clean.position[70])).max() < 2.0
+    assert np.abs(position_difference(faulty.family.clean.position[70], whole.family.clean.position[70])).max() < 2.0
 
 
 def test_specification_detectors_and_environment(folder: Path) -> None:
@@ -186,7 +187,7 @@ def test_specification_detectors_and_environment(folder: Path) -> None:
     scenario = make_scenario(name)
     assert scenario.name == name
     assert make_scenario(f"recorded:{folder},onset={ONSET + 0.5},horizon=6", "tight").name == name
-    present = scenario.satellites(np.array([0, 3]), 0)
+    present = scenario.family.satellites(np.array([0, 3]), 0)
     assert (present >= -1).all()
     assert set(present[present > 0]) <= set(read_ranges(folder).ephemeris.satellites)
     for text in ("snapshot", "cpi:n=20", "separation-bank:n=10"):
@@ -249,10 +250,11 @@ def test_a_phone_in_a_city() -> None:
     assert scenario.slots <= 9
     phone = read_log(PHONE).fixes
     gap = np.flatnonzero(np.diff(phone.time) > 1.5)
-    inside = (scenario.epoch_time > phone.time[gap[0] + 1] + 30.0) & (scenario.epoch_time < phone.time[gap[1]])
-    place, _ = interpolate(phone, scenario.epoch_time[inside])
-    error = position_difference(scenario.clean.position[1:][inside], place)
+    time = scenario.family.epoch_time
+    inside = (time > phone.time[gap[0] + 1] + 30.0) & (time < phone.time[gap[1]])
+    place, _ = interpolate(phone, time[inside])
+    error = position_difference(scenario.family.clean.position[1:][inside], place)
     assert np.median(np.hypot(error[:, 0], error[:, 1])) < 4.0
     # the clock of the phone keeps its rate: pseudoranges and range rates tell the same
-    drift = np.diff(scenario.epochs.clock) / scenario.epochs.interval
-    assert np.median(drift) == pytest.approx(np.median(scenario.epochs.clock_drift), abs=1.0)
+    drift = np.diff(scenario.family.epochs.clock) / scenario.family.epochs.interval
+    assert np.median(drift) == pytest.approx(np.median(scenario.family.epochs.clock_drift), abs=1.0)

@@ -20,16 +20,16 @@ def test_it_is_the_flight_of_the_paper():
     """Section 4: 200 m/s east and 50 m/s north, 160 and 10 Hz, 30 s, R, and the sensors' densities per sample."""
     scenario = make_scenario("shadmehri-flight")
     np.testing.assert_allclose(scenario.velocity(), np.tile([200.0, 50.0, 0.0], (299, 1)), atol=1e-9)
-    assert scenario.trajectory.rate == 160.0
+    assert scenario.truth.trajectory.rate == 160.0
     assert scenario.timeline.interval == 0.1
     assert scenario.timeline.end == pytest.approx(30.0)
-    np.testing.assert_array_equal(scenario.tuning.measurement_covariance, np.diag([3.7**2, 3.7**2, 36.0]))
-    density = scenario.tuning.noise_density(scenario.grade)
+    np.testing.assert_array_equal(scenario.family.tuning.measurement_covariance, np.diag([3.7**2, 3.7**2, 36.0]))
+    density = scenario.family.tuning.noise_density(scenario.family.grade)
     gyro, accelerometer = np.deg2rad(0.005) / 60.0, 20e-6 * 9.80665
     expected = np.repeat([gyro, accelerometer, 1.0 / 60.0, 0.0, 0.0], 3) ** 2
     np.testing.assert_allclose(density, expected, rtol=1e-12)
     assert scenario.matched
-    assert scenario.adaptation is None
+    assert scenario.family.adaptation is None
 
 
 def test_the_attack_of_the_paper_spoofs_east_and_north_at_the_rate_each():
@@ -69,7 +69,7 @@ def test_its_name_builds_it_again(name):
     scenario = make_scenario(name)
     again = make_scenario(scenario.name)
     assert scenario.name == again.name == name
-    assert (scenario.timeline, scenario.adaptation) == (again.timeline, again.adaptation)
+    assert (scenario.timeline, scenario.family.adaptation) == (again.timeline, again.family.adaptation)
 
 
 @pytest.mark.parametrize("rate", [1, 4, 5, 8, 10, 16, 20, 32, 40, 80, 160])
@@ -81,7 +81,7 @@ def test_the_game_begins_with_the_second_fix_and_ends_with_the_flight(rate):
 
 def test_a_self_tuning_filter_is_built_in_both_fidelities_with_the_common_filter_s_model():
     common, own = make_scenario("shadmehri-flight"), make_scenario(ALL)
-    assert own.adaptation == Adaptation(10, "all")
+    assert own.family.adaptation == Adaptation(10, "all")
     assert not own.matched
     np.testing.assert_array_equal(own.linear_model().whitened_gain, common.linear_model().whitened_gain)
     for fidelity, kind in (("linear", AdaptiveNavigator), ("strapdown", AdaptiveStrapdownNavigator)):
@@ -109,7 +109,7 @@ def test_a_self_tuning_filter_is_built_in_both_fidelities_with_the_common_filter
 )
 def test_wrong_options_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
-        make_scenario(f"shadmehri-flight:{options}").navigator("strapdown", None, 0, 1, None)
+        make_scenario(f"shadmehri-flight:{options}").family.navigator("strapdown", None, 0, 1, None)
 
 
 def test_a_threshold_is_calibrated_on_the_self_tuning_filter():

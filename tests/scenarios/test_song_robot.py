@@ -23,7 +23,7 @@ def test_the_truth_is_the_papers_court():
     scenario = make_scenario("song-robot")
     timeline = scenario.timeline
     assert (timeline.start, timeline.interval, timeline.num_epochs) == (0.0, 1.0, 300)
-    motion = scenario.motion()
+    motion = scenario.truth.motion()
     yaw = np.radians(248.0)
     along, across = motion.position @ [np.sin(yaw), np.cos(yaw)], motion.position @ [np.cos(yaw), -np.sin(yaw)]
     assert np.ptp(along) == pytest.approx(13.4, abs=1e-2)
@@ -35,13 +35,13 @@ def test_the_truth_is_the_papers_court():
 
 def test_positions_velocities_and_yaws_belong_together():
     """Trapezoids at 10 Hz: off by up to 0.5 m/s² (0.1 s)² / 8 where a corner begins, right on a straight."""
-    motion = make_scenario("song-robot").motion(5)
+    motion = make_scenario("song-robot").truth.motion(5)
     step = 0.05 * (motion.velocity[1:] + motion.velocity[:-1])
     np.testing.assert_allclose(motion.displacement, step, atol=6.3e-4)
     assert np.median(np.abs(motion.displacement - step)) < 1e-12
     np.testing.assert_allclose(np.sin(motion.yaw), motion.velocity[:, 0] / 0.5, atol=1e-12)
     assert (np.diff(motion.yaw) >= 0.0).all()
-    later = make_scenario("song-robot:horizon=600").motion()
+    later = make_scenario("song-robot:horizon=600").truth.motion()
     laps = round(10.0 * LAP / 0.5)
     np.testing.assert_allclose(later.position[laps:], later.position[:-laps], atol=0.03)
 
@@ -92,7 +92,7 @@ def test_the_name_builds_it(name):
     scenario = make_scenario(name)
     assert scenario.name == name
     assert not scenario.matched
-    assert scenario.facts.fix_sigma == pytest.approx(scenario.tuning.fix_sigma)
+    assert scenario.facts.fix_sigma == pytest.approx(scenario.family.tuning.fix_sigma)
 
 
 @pytest.mark.parametrize(

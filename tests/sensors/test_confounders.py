@@ -20,9 +20,9 @@ BURSTS = Disturbances(outage_share=0.0, multipath_share=1.0)
 NONE = Disturbances(outage_share=0.0, multipath_share=0.0)
 
 
-def drawn(disturbances, num_runs=RUNS, seed=0, timeline=TIMELINE, dimension=3):
+def drawn(disturbances, num_runs=RUNS, seed=0, timeline=TIMELINE):
     confounders = Confounders(disturbances)
-    confounders.bind(timeline, num_runs, dimension)
+    confounders.bind(timeline, num_runs)
     confounders.reset(np.arange(num_runs), RunStreams.from_seed(seed, num_runs))
     return confounders
 
@@ -95,15 +95,13 @@ def test_a_disturbance_lasts_so_many_seconds_where_epochs_are_missing():
     assert set(np.unique(length)) >= {3, 7, 12}
 
 
-@pytest.mark.parametrize("dimension", [3, 6])
-def test_multipath_is_white_noise_of_its_sigma(dimension):
-    """Chi-square with one degree per epoch, axis by axis; nothing outside the burst, nor in the velocity."""
+def test_multipath_is_white_noise_of_its_sigma():
+    """Chi-square with one degree per epoch, axis by axis; nothing outside the burst."""
     given = Disturbances(outage_share=0.0, multipath_share=1.0, multipath_sigma=(5.0, 5.0))
-    confounders = drawn(given, 1000, dimension=dimension)
-    assert confounders.noise.shape == (1000, 231, dimension)
+    confounders = drawn(given, 1000)
+    assert confounders.noise.shape == (1000, 231, 3)
     assert not np.any(confounders.noise[~confounders.multipath])
-    assert not np.any(confounders.noise[:, :, 3:])
-    samples = confounders.noise[confounders.multipath][:, :3] / 5.0
+    samples = confounders.noise[confounders.multipath] / 5.0
     low, high = stats.chi2.ppf([FALSE_FAILURE / 2, 1 - FALSE_FAILURE / 2], len(samples))
     squares = np.sum(samples**2, axis=0)
     assert np.all((low < squares) & (squares < high))
@@ -145,7 +143,7 @@ def test_an_episode_takes_the_same_block_of_draws_whatever_comes_of_it(given):
     """Eight uniform and 3 (K + 1) normal numbers, so that the stream then stands where it does for anyone else."""
     streams, other = RunStreams.from_seed(0, 3), RunStreams.from_seed(0, 3)
     confounders = Confounders(given)
-    confounders.bind(TIMELINE, 3, 6)
+    confounders.bind(TIMELINE, 3)
     confounders.reset(np.arange(3), streams)
     for run in range(3):
         other(run, "confounders").random(8)
@@ -167,7 +165,7 @@ def test_a_staggered_reset_draws_the_next_episode_of_that_run_alone():
     given = Disturbances(outage_share=0.5, multipath_share=0.5)
     streams = RunStreams.from_seed(0, 40)
     confounders = Confounders(given)
-    confounders.bind(TIMELINE, 40, 3)
+    confounders.bind(TIMELINE, 40)
     confounders.reset(np.arange(40), streams)
     available, noise = confounders.available.copy(), confounders.noise.copy()
     again = np.arange(39, 0, -2)
@@ -176,7 +174,7 @@ def test_a_staggered_reset_draws_the_next_episode_of_that_run_alone():
     np.testing.assert_array_equal(confounders.noise[::2], noise[::2])
     for run in again:
         alone, lane = Confounders(given), RunStreams.from_seed(int(run), 1)
-        alone.bind(TIMELINE, 1, 3)
+        alone.bind(TIMELINE, 1)
         for _ in range(2):
             alone.reset(np.array([0]), lane)
         np.testing.assert_array_equal(alone.available[0], confounders.available[run])

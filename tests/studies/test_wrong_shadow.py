@@ -55,7 +55,8 @@ def test_shadows_of_a_table_are_specifications_of_the_same_game():
     built = [make_scenario(shadow.scenario) for shadow in shadows]
     assert [scenario.name for scenario in built] == [shadow.scenario for shadow in shadows]
     assert {scenario.timeline for scenario in built} == {make_scenario(SCENARIO).timeline}
-    assert [scenario.receiver.white_sigma[0] / 3.7 for scenario in built[-4:]] == pytest.approx([0.5, 0.7, 1.4, 2.0])
+    factors = [scenario.family.receiver.white_sigma[0] / 3.7 for scenario in built[-4:]]
+    assert factors == pytest.approx([0.5, 0.7, 1.4, 2.0])
     again = wrong_shadows(make_scenario(f"{SCENARIO},imu=tactical,sigma=7.4"))
     assert again[0].scenario == WIDE
     assert again[-1].scenario == f"{SCENARIO},imu=tactical,sigma=14.8"

@@ -11,7 +11,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
-from spoofgym.navigation.batch import NO_DEMANDS, FilterBatch, Weights
+from spoofgym.navigation.batch import FilterBatch, Weights
 from spoofgym.navigation.credible.kalman import (
     HEIGHT,
     POSITIONS,
@@ -22,7 +22,7 @@ from spoofgym.navigation.credible.kalman import (
     update_covariance,
 )
 from spoofgym.navigation.history import History, Ring, keep
-from spoofgym.navigation.interface import Decision, Demands, Innovation
+from spoofgym.navigation.interface import NO_DEMANDS, Decision, Demands, Innovation
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.odometer import Odometer, OdometerGrade, PlanarMotion, draw_displacement
 from spoofgym.streams import RunStreams

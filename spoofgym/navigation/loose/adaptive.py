@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.batch import NO_DEMANDS, FilterBatch, Weights
-from spoofgym.navigation.interface import Demands, Innovation
+from spoofgym.navigation.batch import FilterBatch, Weights
+from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.adaptation import Adaptation, adapt, negative_ratio
 from spoofgym.navigation.loose.innovation import FilterNoise

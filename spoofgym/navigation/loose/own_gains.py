@@ -7,15 +7,10 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.batch import (
-    NO_DEMANDS,
-    InnovationArrays,
-    Weights,
-    empty_innovation,
-)
+from spoofgym.navigation.batch import InnovationArrays, Weights, empty_innovation
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, POSITION
 from spoofgym.navigation.history import History, Ring, keep
-from spoofgym.navigation.interface import Demands, Innovation
+from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel, LinearSteps
 from spoofgym.navigation.loose.dynamics import ErrorBatch, ErrorRuns, carry_error, carry_unaided, observe
 from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, constant_noise, form_innovation

@@ -7,10 +7,10 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.batch import NO_DEMANDS, InnovationArrays, SharedGains, Weights, empty_innovation
+from spoofgym.navigation.batch import InnovationArrays, SharedGains, Weights, empty_innovation
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, POSITION
 from spoofgym.navigation.history import History
-from spoofgym.navigation.interface import Demands, Innovation
+from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearGains, LinearModel, LinearSteps
 from spoofgym.navigation.loose.dynamics import ErrorBatch, ErrorRuns, carry_error, carry_unaided, observe
 from spoofgym.parallel import RunSlices

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.batch import NO_DEMANDS, Weights, empty_innovation
+from spoofgym.navigation.batch import Weights, empty_innovation
 from spoofgym.navigation.divergence import blank
 from spoofgym.navigation.history import History
-from spoofgym.navigation.interface import Demands, Innovation
+from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.loose import kernels
 from spoofgym.navigation.loose.inertial import InertialBatch
 from spoofgym.navigation.loose.innovation import FilterNoise

@@ -21,7 +21,7 @@ from spoofgym.navigation.separation.covariances import (
     take_back,
     with_gained,
 )
-from spoofgym.navigation.tight.kalman import POSITION
+from spoofgym.navigation.tight.kalman import FIRST_POSITION
 from spoofgym.navigation.tight.states import NUM_INERTIAL
 
 
@@ -290,7 +290,7 @@ def _separate_own(
             for s in range(n):
                 separation[s] -= pulled
             largest = max(largest, _largest(separation, variance, limit, square, windows.alarmed[run]))
-            prior = filters.covariance[run, POSITION + axis, POSITION + axis]
+            prior = filters.covariance[run, FIRST_POSITION + axis, FIRST_POSITION + axis]
             separated.separation[run, a] = np.sqrt(most + gained)
             separated.coasting[run, a] = np.sqrt(prior + most)
         separated.ratio[run] = np.sqrt(largest)

@@ -6,14 +6,92 @@ the diagonal, every other state has its decay alone; a row of H has nine entries
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
-from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE
+from spoofgym.navigation.batch import Weights
+from spoofgym.navigation.error_model import NUM_NAVIGATION
+from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE, POSITION
 
-POSITION = 6
+FIRST_POSITION = POSITION.start
 """Place of the position's first state."""
+
+
+class FilterSteps(NamedTuple):
+    """Φ and Q as the filter believes them; leading axis: epochs. What each is, `TightDynamics` says."""
+
+    transition: Floats
+    process_noise: Floats
+    decay: Floats
+    variance: Floats
+    clock_noise: Floats
+    intervals: Floats
+    clock_jump: Floats
+    started: Flags
+    satellite_sigma: Floats
+
+
+class Ranges(NamedTuple):
+    """H and R of the ranges of all epochs.
+
+    Attributes:
+        columns: places of the entries of H, (m, 9).
+        values: the entries, (E, m, 9); zeros cost nothing.
+        variance: the diagonal of R, (E, m).
+    """
+
+    columns: Runs
+    values: Floats
+    variance: Floats
+
+
+class RangeInnovations(NamedTuple):
+    """What kernels fill with the innovations of k runs on ranges.
+
+    Attributes:
+        residual: z, predicted minus measured, (k, m), m and m/s.
+        covariance: S, (k, m, m).
+        whitened: w, (k, m).
+        nis: w' w, (k,).
+        response: L⁻¹ H on the three states of the position, (k, m, 3), 1/m.
+    """
+
+    residual: Floats
+    covariance: Floats
+    whitened: Floats
+    nis: Floats
+    response: Floats
+
+
+class Workspace(NamedTuple):
+    """Memory for the innovation of one run: H (m, 9) and R (m,) of the ranges used, HP (m, n) and L (m, m)."""
+
+    values: Floats
+    variance: Floats
+    cross: Floats
+    factor: Floats
+
+
+def empty_innovations(count: int, m: int) -> RangeInnovations:
+    """Arrays for the innovations of ``count`` runs with ``m`` ranges each."""
+    return RangeInnovations(
+        residual=np.empty((count, m)),
+        covariance=np.empty((count, m, m)),
+        whitened=np.empty((count, m)),
+        nis=np.empty(count),
+        response=np.empty((count, m, 3)),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def workspace(ranges: Ranges, n: int) -> Workspace:
+    """Memory for the innovations of a filter of n states."""
+    m, entries = ranges.columns.shape
+    return Workspace(np.empty((m, entries)), np.empty(m), np.empty((m, n)), np.empty((m, m)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -23,7 +101,7 @@ def predict_error(
     """x <- Φ x + w.
 
     Args:
-        columns: the first nine rows of Φ, stored by columns, (15, 9).
+        columns: the first nine rows of Φ, stored by columns, (15, 9): no other state acts on them.
         decay: the diagonal of Φ, (n,); its first nine entries are not read.
         interval: between epochs, s: what the clock's rate adds to its offset.
         noise: w, (n,).
@@ -32,7 +110,7 @@ def predict_error(
     """
     for i in range(NUM_NAVIGATION):
         work[i] = noise[i]
-    for j in range(NUM_STATES):
+    for j in range(columns.shape[0]):
         factor = error[j]
         for i in range(NUM_NAVIGATION):
             work[i] += columns[j, i] * factor
@@ -66,7 +144,7 @@ def predict_covariance(
         covariance: P, (n, n), in place.
         work: (9, n).
     """
-    n = covariance.shape[0]
+    n, inertial = covariance.shape[0], transition.shape[1]
     for j in range(n):
         covariance[CLOCK, j] += interval * covariance[DRIFT, j]
     for i in range(n):
@@ -74,7 +152,7 @@ def predict_covariance(
     for i in range(NUM_NAVIGATION):
         for j in range(n):
             work[i, j] = 0.0
-        for k in range(NUM_STATES):
+        for k in range(inertial):
             factor = transition[i, k]
             if factor != 0.0:
                 for j in range(n):
@@ -82,7 +160,7 @@ def predict_covariance(
     for i in range(NUM_NAVIGATION):
         for j in range(i + 1):
             total = process_noise[i, j]
-            for k in range(NUM_STATES):
+            for k in range(inertial):
                 total += work[i, k] * transition[j, k]
             covariance[i, j] = total
             covariance[j, i] = total
@@ -117,6 +195,23 @@ def start_satellites(started: Flags, sigma: Floats, covariance: Floats) -> None:
                     covariance[place, j] = 0.0
                     covariance[j, place] = 0.0
                 covariance[place, place] = sigma[a] * sigma[a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def predict_filter(k: int, steps: FilterSteps, covariance: Floats, work: Floats) -> None:
+    """Carry P (n, n), in place, from epoch k - 1 to epoch k; work (9, n) is overwritten."""
+    predict_covariance(
+        steps.transition[k],
+        steps.process_noise[k],
+        steps.decay,
+        steps.variance,
+        steps.clock_noise,
+        steps.intervals[k],
+        covariance,
+        work,
+    )
+    covariance[CLOCK, CLOCK] += steps.clock_jump[k]
+    start_satellites(steps.started[k], steps.satellite_sigma, covariance)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -177,8 +272,8 @@ def position_response(columns: Runs, values: Floats, factor: Floats, response: F
         for c in range(3):
             response[a, c] = 0.0
         for k in range(3):
-            if columns[a, k] >= POSITION:
-                response[a, columns[a, k] - POSITION] = values[a, k]
+            if columns[a, k] >= FIRST_POSITION:
+                response[a, columns[a, k] - FIRST_POSITION] = values[a, k]
         for c in range(3):
             total = response[a, c]
             for b in range(a):
@@ -258,35 +353,39 @@ def leave_out(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def form_innovation(
-    residual: Floats,
+    place: int,
+    k: int,
+    ranges: Ranges,
+    weights: Weights,
     covariance: Floats,
-    columns: Runs,
-    values: Floats,
-    variance: Floats,
-    innovation: Floats,
     gain: Floats,
-    response: Floats,
-    whitened: Floats,
-    cross: Floats,
-    factor: Floats,
-) -> float:
-    """All that a residual leads to: S, U', L⁻¹ H on the position, w, and the NIS, which it returns.
+    formed: RangeInnovations,
+    work: Workspace,
+) -> None:
+    """Form all that the residual of a run leads to: S, U', L⁻¹ H on the position, w, and the NIS.
 
     Args:
-        residual: z, (m,).
+        place: where the run stands in ``weights`` and ``formed``.
+        k: the run's epoch.
+        ranges: of all epochs.
+        weights: the ranges used; the residual of the others becomes zero.
         covariance: P, (n, n).
-        columns: places of the entries of H, (m, 9).
-        values: the entries, (m, 9).
-        variance: diagonal of R, (m,).
-        innovation: S, (m, m), overwritten.
         gain: U', (m, n), overwritten.
-        response: (m, 3), overwritten.
-        whitened: w, (m,), overwritten.
-        cross: (m, n), work.
-        factor: (m, m), work.
+        formed: holds the residual; the rest of the place is overwritten.
+        work: overwritten.
     """
-    innovation_covariance(covariance, columns, values, variance, cross, innovation)
-    kalman.cholesky(innovation, factor)
-    whitened_gain(cross, factor, gain)
-    position_response(columns, values, factor, response)
-    return kalman.whiten(factor, residual, whitened)
+    residual = formed.residual[place]
+    leave_out(
+        weights.satellites[place],
+        ranges.values[k],
+        ranges.variance[k],
+        weights.noise_scale[place],
+        residual,
+        work.values,
+        work.variance,
+    )
+    innovation_covariance(covariance, ranges.columns, work.values, work.variance, work.cross, formed.covariance[place])
+    kalman.cholesky(formed.covariance[place], work.factor)
+    whitened_gain(work.cross, work.factor, gain)
+    position_response(ranges.columns, work.values, work.factor, formed.response[place])
+    formed.nis[place] = kalman.whiten(work.factor, residual, formed.whitened[place])

@@ -8,21 +8,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
-from spoofgym.kernels import njit
-from spoofgym.navigation import kalman
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.linear_model import ErrorDynamics, semidefinite_factor
-from spoofgym.navigation.tight import kalman as tight_filter
+from spoofgym.navigation.tight.kalman import FilterSteps, Ranges
+from spoofgym.navigation.tight.recursion import covariance_recursion, empty_kept
 from spoofgym.navigation.tight.states import (
     BIAS,
     CLOCK,
     DRIFT,
+    INERTIAL,
+    NUM_INERTIAL,
     PER_SATELLITE,
     TROPOSPHERE,
     num_states,
@@ -30,6 +32,7 @@ from spoofgym.navigation.tight.states import (
     observation_values,
     slot_states,
 )
+from spoofgym.navigation.tight.truth import ErrorSteps
 from spoofgym.sensors.geometry import SatelliteGeometry
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.ranging import RangeErrors, clock_noise
@@ -120,12 +123,61 @@ class TightDynamics(Immutable):
         """Square root of `variance`, (n,)."""
         return np.sqrt(self.variance)
 
+    @cached_property
+    def filter_steps(self) -> FilterSteps:
+        """What kernels carry the filter's P with."""
+        return FilterSteps(
+            transition=self.transition,
+            process_noise=self.process_noise,
+            decay=self.decay,
+            variance=self.variance,
+            clock_noise=self.clock_noise,
+            intervals=self.intervals,
+            clock_jump=self.clock_jump,
+            started=self.started,
+            satellite_sigma=self.satellite_sigma,
+        )
+
+    @cached_property
+    def error_steps(self) -> ErrorSteps:
+        """What kernels carry the true error with."""
+        return ErrorSteps(
+            transition_columns=self.transition_columns,
+            noise_columns=self.noise_columns,
+            decay=self.decay,
+            noise_sigma=self.noise_sigma,
+            clock_factor=self.clock_factor,
+            intervals=self.intervals,
+            started=self.started,
+            satellite_sigma=self.satellite_sigma,
+        )
+
+    @cached_property
+    def ranges(self) -> Ranges:
+        """H and R for kernels."""
+        return Ranges(columns=self.columns, values=self.values, variance=self.noise_variance)
+
     def part(self, first: int, last: int) -> TightDynamics:
         """Epochs first..last-1 of these."""
         whole = {"interval", "decay", "variance", "clock_noise", "satellite_sigma", "columns"}
-        cut = {item.name: getattr(self, item.name)[first:last] for item in fields(TightDynamics)
-               if item.name not in whole}
-        return replace(self, **cut)
+        by_epoch = [item.name for item in fields(TightDynamics) if item.name not in whole]
+        return replace(self, **{name: getattr(self, name)[first:last] for name in by_epoch})
+
+
+class TightGains(NamedTuple):
+    """The arrays of a `TightModel` that kernels form innovations with where gains are shared.
+
+    Attributes:
+        columns: places of the entries of H, (m, 9).
+        values: the entries, (K+1, m, 9).
+        innovation_factor: lower L with S = L L', (K+1, m, m).
+        whitened_gain: U' = L⁻¹ H P, (K+1, m, n).
+    """
+
+    columns: Runs
+    values: Floats
+    innovation_factor: Floats
+    whitened_gain: Floats
 
 
 @dataclass(frozen=True)
@@ -166,21 +218,30 @@ class TightModel(Immutable):
         return self.dynamics.num_epochs
 
     @cached_property
+    def gains(self) -> TightGains:
+        """What kernels form innovations with where gains are shared."""
+        return TightGains(
+            self.dynamics.columns, self.dynamics.values, self.innovation_factor, self.whitened_gain
+        )
+
+    @cached_property
     def separation_transition(self) -> Floats:
         """Φ of the fifteen states that inertial coasting needs, (K+1, 15, 15)."""
         dynamics = self.dynamics
-        whole = np.zeros((len(self.time), NUM_STATES, NUM_STATES))
+        whole = np.zeros((len(self.time), NUM_INERTIAL, NUM_INERTIAL))
         whole[:, :NUM_NAVIGATION] = dynamics.transition
-        whole[:, range(9, 15), range(9, 15)] = dynamics.decay[BIAS]
+        biases = range(BIAS.start, BIAS.stop)
+        whole[:, biases, biases] = dynamics.decay[BIAS]
         return whole
 
     @cached_property
     def separation_noise(self) -> Floats:
         """Q of the fifteen states that inertial coasting needs, (K+1, 15, 15)."""
         dynamics = self.dynamics
-        whole = np.zeros((len(self.time), NUM_STATES, NUM_STATES))
+        whole = np.zeros((len(self.time), NUM_INERTIAL, NUM_INERTIAL))
         whole[:, :NUM_NAVIGATION, :NUM_NAVIGATION] = dynamics.process_noise
-        whole[:, range(9, 15), range(9, 15)] = dynamics.variance[BIAS]
+        biases = range(BIAS.start, BIAS.stop)
+        whole[:, biases, biases] = dynamics.variance[BIAS]
         return whole
 
 
@@ -285,7 +346,7 @@ def cold_covariance(
         slots: S.
     """
     sigma = np.zeros(num_states(slots))
-    sigma[:NUM_STATES] = inertial_sigma
+    sigma[INERTIAL] = inertial_sigma
     sigma[CLOCK], sigma[DRIFT] = clock_sigma
     sigma[TROPOSPHERE] = errors.troposphere_sigma
     return np.diag(sigma**2)
@@ -293,8 +354,8 @@ def cold_covariance(
 
 def settle(dynamics: TightDynamics, covariance: Floats) -> Floats:
     """The filter's P after all epochs of ``dynamics``, every range used, (n, n)."""
-    settled, nothing = covariance.copy(), np.empty((0, 0, 0))
-    _run(dynamics, settled, (nothing,) * 5)
+    settled, nothing = covariance.copy(), empty_kept(0, dynamics.dimension, dynamics.num_states)
+    covariance_recursion(dynamics.filter_steps, dynamics.ranges, settled, nothing)
     return settled
 
 
@@ -305,72 +366,6 @@ def tight_model(dynamics: TightDynamics, prior_covariance: Floats) -> TightModel
         dynamics: of the K+1 epochs.
         prior_covariance: the filter's P after epoch -1, (n, n).
     """
-    epochs, m, n = len(dynamics.time), dynamics.dimension, dynamics.num_states
-    kept = tuple(np.empty((epochs, *shape)) for shape in ((n, n), (m, m), (m, m), (m, n), (m, 3)))
-    _run(dynamics, prior_covariance.copy(), kept)
-    return TightModel(dynamics, prior_covariance, *kept)
-
-
-def _run(dynamics: TightDynamics, covariance: Floats, kept: tuple[Floats, ...]) -> None:
-    prior, innovations, factors, gains, responses = kept
-    _recursion(
-        dynamics.transition,
-        dynamics.process_noise,
-        dynamics.decay,
-        dynamics.variance,
-        dynamics.clock_noise,
-        dynamics.intervals,
-        dynamics.clock_jump,
-        dynamics.started,
-        dynamics.satellite_sigma,
-        dynamics.columns,
-        dynamics.values,
-        dynamics.noise_variance,
-        covariance,
-        prior,
-        innovations,
-        factors,
-        gains,
-        responses,
-    )
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _recursion(
-    transition: Floats,
-    process_noise: Floats,
-    decay: Floats,
-    variance: Floats,
-    clock_noise: Floats,
-    intervals: Floats,
-    clock_jump: Floats,
-    started: Flags,
-    satellite_sigma: Floats,
-    columns: Runs,
-    values: Floats,
-    noise_variance: Floats,
-    covariance: Floats,
-    prior: Floats,
-    innovations: Floats,
-    factors: Floats,
-    gains: Floats,
-    responses: Floats,
-) -> None:
-    """The filter's covariance with every range used; keeps what the arrays of epochs have room for."""
-    m, n = columns.shape[0], covariance.shape[0]
-    work, cross, innovation = np.empty((NUM_NAVIGATION, n)), np.empty((m, n)), np.empty((m, m))
-    factor, gain = np.empty((m, m)), np.empty((m, n))
-    keep = len(prior) > 0
-    for k in range(len(transition)):
-        tight_filter.predict_covariance(
-            transition[k], process_noise[k], decay, variance, clock_noise, intervals[k], covariance, work
-        )
-        covariance[CLOCK, CLOCK] += clock_jump[k]
-        tight_filter.start_satellites(started[k], satellite_sigma, covariance)
-        tight_filter.innovation_covariance(covariance, columns, values[k], noise_variance[k], cross, innovation)
-        kalman.cholesky(innovation, factor)
-        tight_filter.whitened_gain(cross, factor, gain)
-        if keep:
-            prior[k], innovations[k], factors[k], gains[k] = covariance, innovation, factor, gain
-            tight_filter.position_response(columns, values[k], factor, responses[k])
-        tight_filter.update_covariance(gain, covariance)
+    kept = empty_kept(len(dynamics.time), dynamics.dimension, dynamics.num_states)
+    covariance_recursion(dynamics.filter_steps, dynamics.ranges, prior_covariance.copy(), kept)
+    return TightModel(dynamics, prior_covariance, **kept._asdict())

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.batch import NO_DEMANDS
-from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.interface import NO_DEMANDS, Demands
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tight.states import CLOCK

@@ -24,18 +24,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats
+from spoofgym.navigation.error_model import BIAS, INERTIAL, NUM_STATES, POSITION, VELOCITY
 from spoofgym.sensors.geometry import SatelliteGeometry
 from spoofgym.sensors.ranging import obliquity, troposphere_mapping
 
-NUM_INERTIAL = 15
-"""States of the loosely coupled filter, which come first."""
-INERTIAL = slice(0, NUM_INERTIAL)
-NAVIGATION = slice(0, 9)
-VELOCITY = slice(3, 6)
-POSITION = slice(6, 9)
-BIAS = slice(9, 15)
-CLOCK, DRIFT, TROPOSPHERE = 15, 16, 17
-NUM_COMMON = 18
+__all__ = [
+    "AMBIGUITY",
+    "BIAS",
+    "CARRIER_MULTIPATH",
+    "CLOCK",
+    "CODE_MULTIPATH",
+    "DRIFT",
+    "EPHEMERIS",
+    "INERTIAL",
+    "IONOSPHERE",
+    "NONZERO",
+    "NUM_COMMON",
+    "NUM_INERTIAL",
+    "OBSERVABLES",
+    "PER_SATELLITE",
+    "POSITION",
+    "TROPOSPHERE",
+    "VELOCITY",
+    "num_states",
+    "observation_columns",
+    "observation_values",
+    "slot_states",
+]
+
+NUM_INERTIAL = NUM_STATES
+"""States of the loosely coupled filter, which come first; their places are those of `error_model`."""
+CLOCK, DRIFT, TROPOSPHERE = range(NUM_INERTIAL, NUM_INERTIAL + 3)
+NUM_COMMON = NUM_INERTIAL + 3
 PER_SATELLITE = 5
 AMBIGUITY, CODE_MULTIPATH, CARRIER_MULTIPATH, IONOSPHERE, EPHEMERIS = range(PER_SATELLITE)
 

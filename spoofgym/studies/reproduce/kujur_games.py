@@ -11,9 +11,9 @@ from spoofgym.attacks.profiles import Ramp
 from spoofgym.attacks.tracking_error import TrackingError
 from spoofgym.detectors.cpi import UP, projected, unit_vector
 from spoofgym.navigation.interface import Demands
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
-from spoofgym.tight_scenario import TightScenario
 
 HORIZON = 360
 """Epochs of half a second: the longest monitor run time of the paper, 180 s."""
@@ -57,15 +57,13 @@ class Game:
     separation: Floats
 
 
-def flight(imu: str = NAVIGATION, hour: float | None = None, horizon: int = HORIZON) -> TightScenario:
+def flight(imu: str = NAVIGATION, hour: float | None = None, horizon: int = HORIZON) -> Scenario:
     """The flight of the paper with one IMU, at its own hour of the constellation's day or at another."""
     options = f"kujur-flight:horizon={horizon},imu={imu}" + ("" if hour is None else f",hour={hour:g}")
-    scenario = make_scenario(options)
-    assert isinstance(scenario, TightScenario)
-    return scenario
+    return make_scenario(options)
 
 
-def play(scenario: TightScenario, replica: Replica, runs: int, seed: int) -> Game:
+def play(scenario: Scenario, replica: Replica, runs: int, seed: int) -> Game:
     """Play runs in which every range from epoch 1 on is spoofed; run i is seeded ``seed + i``, whatever the replica.
 
     Args:

@@ -18,8 +18,8 @@ from spoofgym.detectors.cpi import UP, unit_vector
 from spoofgym.detectors.separation_theory import protection_level, separation_threshold
 from spoofgym.navigation.separation.coasting import coasting_tables
 from spoofgym.navigation.tight.tracking_response import projected_response, tracking_response
+from spoofgym.scenario import Scenario
 from spoofgym.studies.reproduce.kujur_games import INTERVAL, Replica, flight
-from spoofgym.tight_scenario import TightScenario
 
 P_FA, P_MD_CPI, P_MD_SS = 1e-5, 1e-7, 1e-6
 
@@ -68,7 +68,7 @@ def windows(imu: str, hour: float | None = None, horizon: int = 360) -> Windows:
     return Windows(information, projected_response(model, up))
 
 
-def cumulative_exact(scenario: TightScenario, replica: Replica, n: int) -> float:
+def cumulative_exact(scenario: Scenario, replica: Replica, n: int) -> float:
     """P_MD of the CI after n epochs, with the filter's feedback."""
     model = scenario.tight_model()
     response = tracking_response(model, unit_vector("kujur-2024", UP))[:n, :, :n]
@@ -93,7 +93,7 @@ class Coasting:
         return float(protection_level(threshold, P_MD_SS, self.sigma[n - 1]))
 
 
-def coasting(scenario: TightScenario) -> Coasting:
+def coasting(scenario: Scenario) -> Coasting:
     """Of the last epoch of a flight."""
     model = scenario.tight_model()
     tables = coasting_tables(model, (2,), model.num_epochs + 1)

@@ -1,4 +1,4 @@
-"""A game on the tightly coupled filter: truth, ranges to satellites, filter settings and the stretch of time."""
+"""The tightly coupled filter on a simulated trajectory: it takes the ranges to satellites."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
-from spoofgym.geodesy import displace, geodetic_to_ecef, position_difference
-from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
+from spoofgym.geodesy import displace, geodetic_to_ecef
+from spoofgym.navigation.facts import FilterFacts
+from spoofgym.navigation.family import FIDELITIES
 from spoofgym.navigation.interface import Demands, Navigator, Spoof
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
 from spoofgym.navigation.loose.strapdown_model import strapdown_model
@@ -24,91 +25,58 @@ from spoofgym.navigation.tight.model import (
     tight_model,
 )
 from spoofgym.navigation.tight.own_gains import TightOwnNavigator
+from spoofgym.navigation.tight.ranges import RangeFamily, along, captured_ranges, disturbed_ranges
 from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.navigation.tight.states import BIAS, OBSERVABLES
 from spoofgym.navigation.tight.strapdown import TightStrapdownNavigator
 from spoofgym.navigation.tuning import FilterTuning
-from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices
-from spoofgym.scenario import Scenario, check_game
 from spoofgym.sensors.geometry import Constellation, SatelliteGeometry, view
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.ranging import RangeErrors
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.streams import RunStreams
-from spoofgym.timeline import Timeline
-from spoofgym.trajectory import Trajectory
+from spoofgym.truth import SimulatedTruth
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TightScenario(Scenario):
-    """A scenario with a known true trajectory whose filter takes the ranges themselves.
+class TightFamily(RangeFamily):
+    """Tightly coupled filters on a simulated trajectory.
 
-    The filter is matched: every error of the IMU and of the ranges acts as the filter believes.
+    They are matched: every error of the IMU and of the ranges acts as the filter believes.
 
     Attributes:
-        name: the specification that builds it.
-        trajectory: the truth, at the IMU rate.
+        truth: the true motion.
         grade: of the IMU.
         errors: of the ranges.
         constellation: where the satellites are.
         start_time: the constellation's time at the start of the trajectory, s.
-        rate: of the receiver, Hz.
         mask: elevation below which a satellite is not used, rad.
         observable: ``carrier`` or ``rate``, beside the code.
         tuning: the filter's initial uncertainty and process noise; its measurement noise is not read.
         clock_sigma: initial uncertainty of the receiver's clock, m and m/s.
-        onset: time of epoch 0, the last clean epoch, s.
-        horizon: epochs of the game.
-        drag_off_rate: largest rate of the spoofed position per axis, m/s.
-        clock_rate: largest rate of the spoofed clock, m/s.
-        error_scale: metres of error that make a spoofer's reward of 1.
-        defender_scale: metres of error that cost a defender 1.
-        depth_table: depths among which a defender chooses, epochs.
-        alert_limits: horizontal and vertical, m.
     """
 
-    name: str
-    trajectory: Trajectory
+    truth: SimulatedTruth
     grade: ImuGrade
     errors: RangeErrors
     constellation: Constellation
     start_time: float
-    rate: float
     mask: float
     tuning: FilterTuning
-    onset: float
-    horizon: int
-    drag_off_rate: tuple[float, float, float]
-    clock_rate: float
-    error_scale: float
-    alert_limits: tuple[float, float]
     observable: str = "carrier"
     clock_sigma: tuple[float, float] = (10.0, 1.0)
-    defender_scale: float = 50.0
-    depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
 
-    coupling = "tight"
+    fidelities = FIDELITIES
     matched = True
-    offers = (INERTIAL_SOLUTION, RANGES)
+    random = True
 
     def __post_init__(self) -> None:
-        check_game(f"scenario {self.name!r}", self.onset, 1.0 / self.rate, self.horizon, self.trajectory)
         if self.observable not in OBSERVABLES:
             raise ValueError(f"observable must be one of {', '.join(OBSERVABLES)}, got {self.observable!r}")
 
     @property
-    def timeline(self) -> Timeline:  # type: ignore[override]
-        """The epochs of the game."""
-        return Timeline.steady(self.onset, 1.0 / self.rate, self.horizon)
-
-    @property
-    def dimension(self) -> int:  # type: ignore[override]
-        """m, of the ranges of all slots."""
-        return 2 * self.slots
-
-    @property
-    def slots(self) -> int:  # type: ignore[override]
+    def slots(self) -> int:
         """S, satellites that are tracked at most."""
         return self.geometry.num_slots
 
@@ -120,48 +88,39 @@ class TightScenario(Scenario):
     @property
     def facts(self) -> FilterFacts:
         """What the designer of the filter knows."""
-        return replace(super().facts, tight_model=self.tight_model)
-
-    def times(self, burn_in: int) -> Floats:
-        """Scenario time of the epochs -burn_in..K, s."""
-        interval = self.timeline.interval
-        return Timeline.steady(self.onset - burn_in * interval, interval, self.horizon + burn_in).times
-
-    def _samples(self, times: Floats) -> Runs:
-        return np.asarray(np.round(times * self.trajectory.rate), dtype=np.int64)
-
-    def velocity(self, burn_in: int = 0) -> Floats:
-        """The true velocity at epochs -burn_in..K, (burn_in + K + 1, 3), ENU, m/s."""
-        return self.trajectory.velocity[self._samples(self.times(burn_in))]
-
-    def track(self) -> Floats:
-        """The true position at epochs 0..K from that at epoch 0, (K+1, 3), m ENU."""
-        position = self.trajectory.position[self._samples(self.times(0))]
-        return position_difference(position, position[0])
+        return FilterFacts(
+            self.truth.name,
+            self.truth.timeline.interval,
+            self.bias_sigma,
+            self.offers,
+            self.linear_model,
+            tight_model=self.tight_model,
+            matched=self.matched,
+        )
 
     @cached_property
     def geometry(self) -> SatelliteGeometry:
         """The satellites in view at every epoch from the start of the trajectory to the end of the game."""
-        interval = self.timeline.interval
-        times = np.asarray(interval * np.arange(1, round(self.timeline.end / interval) + 1), dtype=np.float64)
-        return view(
-            self.constellation, self.trajectory.position[self._samples(times)], self.start_time + times, self.mask
-        )
+        truth, interval = self.truth, self.truth.interval
+        times = np.asarray(interval * np.arange(1, round(truth.timeline.end / interval) + 1), dtype=np.float64)
+        position = truth.trajectory.position[truth.samples(times)]
+        return view(self.constellation, position, self.start_time + times, self.mask)
 
     @cached_property
     def _dynamics(self) -> TightDynamics:
-        interval = self.timeline.interval
         # the instability of the biases acts once per epoch, on states of its own
         steady = replace(self.grade, gyro_instability=0.0, accelerometer_instability=0.0)
         inertial = error_dynamics(
-            self.trajectory,
+            self.truth.trajectory,
             steady,
-            Receiver(rate=self.rate),
+            Receiver(rate=self.truth.rate),
             self.tuning,
             self.tuning.position_random_walk,
             len(self.geometry.time),
         )
-        dynamics = tight_dynamics(inertial, self.grade, self.errors, self.geometry, interval, self.observable)
+        dynamics = tight_dynamics(
+            inertial, self.grade, self.errors, self.geometry, self.truth.interval, self.observable
+        )
         return replace(dynamics, time=self.geometry.time - self.start_time)
 
     def _first(self, burn_in: int) -> int:
@@ -170,10 +129,10 @@ class TightScenario(Scenario):
         Raises:
             ValueError: the trajectory does not reach back that far.
         """
-        first = round(self.onset * self.rate) - 1 - burn_in
+        first = self.truth.first(burn_in)
         if first < 0:
             raise ValueError(
-                f"scenario {self.name!r}: a burn-in of {burn_in} epochs reaches before the trajectory, which has "
+                f"scenario {self.truth.name!r}: a burn-in of {burn_in} epochs reaches before the trajectory, which has "
                 f"{first + burn_in} before the game: take detectors with a shorter memory, or a later onset"
             )
         return first
@@ -186,7 +145,7 @@ class TightScenario(Scenario):
         cold = cold_covariance(inertial, self.clock_sigma, self.errors, self.slots)
         dynamics = self._dynamics
         prior = settle(dynamics.part(0, first), cold)
-        return tight_model(dynamics.part(first, first + self.horizon + burn_in + 1), prior)
+        return tight_model(dynamics.part(first, first + self.truth.horizon + burn_in + 1), prior)
 
     def linear_model(self, burn_in: int = 0) -> LinearModel:
         """A tightly coupled filter has none.
@@ -194,36 +153,37 @@ class TightScenario(Scenario):
         Raises:
             ValueError: always.
         """
-        raise ValueError(f"scenario {self.name!r} is tightly coupled: it has a tight_model, not a linear_model")
+        raise ValueError(
+            f"scenario {self.truth.name!r} is tightly coupled: it has a tight_model, not a linear_model"
+        )
 
     def navigator(
         self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices
     ) -> Navigator:
-        """A navigator whose model starts ``burn_in`` epochs before epoch 0; arguments as in `Scenario`."""
-        self.check_fidelity(fidelity)
+        """A navigator whose model starts ``burn_in`` epochs before epoch 0; arguments as in `FilterFamily`."""
         model = self.tight_model(burn_in)
         if fidelity == "linear":
             kind = TightOwnNavigator if demands.excludes else TightNavigator
             return kind(model, num_runs, slices, demands)
-        times = self.times(burn_in)
+        timeline = self.truth.timeline_from(burn_in)
         inertial = strapdown_model(
-            self.trajectory,
+            self.truth.trajectory,
             self.grade,
-            Receiver(rate=self.rate),
+            Receiver(rate=self.truth.rate),
             self.tuning,
             self.tuning.position_random_walk,
             model.prior_covariance,
-            Timeline.steady(times[0], self.timeline.interval, self.horizon + burn_in),
+            timeline,
         )
         first = self._first(burn_in)
-        satellites = self.geometry.position[first : first + len(times)]
+        satellites = self.geometry.position[first : first + timeline.num_epochs + 1]
         return TightStrapdownNavigator(inertial, model, satellites, num_runs, slices, demands)
 
     @kept_by_burn_in
     def _initial_factors(self, burn_in: int) -> tuple[Floats, Floats]:
         """Square roots of the covariance of the error, (n, n), and of the estimated biases, (6, 6)."""
         prior = self.tight_model(burn_in).prior_covariance
-        biases = bias_variance(self.grade, self.timeline.interval, self._first(burn_in))
+        biases = bias_variance(self.grade, self.truth.timeline.interval, self._first(burn_in))
         estimated = np.diag(biases) - prior[BIAS, BIAS]
         # a filter that begins less certain than the data sheet has not estimated such a bias yet
         wider = np.diag(estimated) < 0.0
@@ -285,50 +245,8 @@ class TightScenario(Scenario):
         """Number of the satellite in each slot, (k, S); -1 = none."""
         return self.tight_model(burn_in).dynamics.satellite[index]
 
-    def white_innovations(self) -> WhiteInnovations:
-        """What clean innovations at epochs 0..K are made of."""
-        model = self.tight_model()
-        return WhiteInnovations(model.innovation_factor, model.position_response, np.tile(model.dynamics.present, 2))
-
     def _distance(self, index: Runs, burn_in: int, offset: Floats) -> Floats:
         """From the satellites to the true position moved by offsets, (k, S), m."""
-        position = displace(self.trajectory.position[self._samples(self.times(burn_in))][index], offset)
+        position = displace(self.truth.position(burn_in)[index], offset)
         satellites = self.geometry.position[self._first(burn_in) + index] - geodetic_to_ecef(position)[:, None]
         return np.sqrt(satellites[..., 0] ** 2 + satellites[..., 1] ** 2 + satellites[..., 2] ** 2)
-
-
-def captured_ranges(present: Flags, spoof: Spoof, code: Floats, second: Floats) -> Floats:
-    """What a spoofer adds to code and second observable of the satellites that there are and that it captures, (k, m).
-
-    Args:
-        present: slots that hold a satellite, (k, S).
-        spoof: tells which are captured.
-        code: what it adds to each, (k, S), m.
-        second: likewise, m or m/s.
-    """
-    captured = present if spoof.satellites is None else present & spoof.satellites
-    return np.concatenate([code * captured, second * captured], axis=1)
-
-
-def disturbed_ranges(direction: Floats, multipath: Floats) -> Floats:
-    """What multipath adds to the code, (k, K+1, m), so that a fix would err by ``multipath``, (k, K+1, 3), m.
-
-    Args:
-        direction: unit vectors to the satellites at epochs 0..K, (K+1, S, 3), ENU.
-        multipath: its effect on fixes.
-    """
-    slots = direction.shape[1]
-    added = np.zeros((*multipath.shape[:2], 2 * slots))
-    for epoch in np.flatnonzero(multipath.any(axis=(0, 2))):
-        added[:, epoch, :slots] = -along(direction[epoch][None], multipath[:, epoch])
-    return added
-
-
-def along(direction: Floats, vector: Floats) -> Floats:
-    """Components of vectors (k, 3) along unit vectors (k, S, 3), (k, S)."""
-    return (
-        direction[..., 0] * vector[:, None, 0]
-        + direction[..., 1] * vector[:, None, 1]
-        + direction[..., 2] * vector[:, None, 2]
-    )
-

@@ -17,7 +17,7 @@ UP, SLANTED = np.array([0.0, 0.0, 1.0]), np.array([0.48, -0.6, 0.64])
 def impulses(scenario, direction):
     """Whitened innovations at epochs 1..K, (K, m, K): run j of a filter without noise has a metre of error at j + 1."""
     epochs = scenario.timeline.num_epochs
-    navigator = scenario.navigator("linear", Demands(), 0, epochs, RunSlices(1))
+    navigator = scenario.family.navigator("linear", Demands(), 0, epochs, RunSlices(1))
     whitened, before = [], np.zeros((epochs, 3))
     for k in range(epochs + 1):
         offset = np.zeros((epochs, 3))
@@ -26,7 +26,7 @@ def impulses(scenario, direction):
         rate, nothing = (offset - before) / scenario.timeline.interval, np.zeros(epochs)
         navigator.propagate()
         spoof = Spoof(offset, rate, nothing, nothing)
-        innovation = navigator.innovate(scenario.spoofed("linear", navigator.index, 0, spoof))
+        innovation = navigator.innovate(scenario.family.spoofed("linear", navigator.index, 0, spoof))
         navigator.resolve(Decision(np.ones(epochs, dtype=bool)))
         whitened.append(innovation.whitened.copy())
         before = offset

@@ -1,8 +1,8 @@
-"""What every recorded game has in common: a log, its alignment, and epochs that need not be equally spaced."""
+"""What all filters on a log have in common: the log, its alignment, and epochs that need not be equally spaced."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -11,12 +11,14 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
-from spoofgym.arrays import Flags, Floats
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
+from spoofgym.immutable import Immutable
 from spoofgym.logs.alignment import Alignment, align
 from spoofgym.logs.log import Log, covered, interpolate
 from spoofgym.logs.log_warning import warn
 from spoofgym.logs.table import seconds
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.tuning import FilterTuning
@@ -37,10 +39,11 @@ CHANCE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RecordedScenario(Scenario):
-    """A game on a log, in the strapdown fidelity. The filter is aligned on its fixes and runs from there.
+class RecordedFamily(Immutable, ABC):
+    """Filters on a log, in the strapdown fidelity. They are aligned on its fixes and run from there.
 
-    Epochs are where the receiver gave something; ``timeline.interval`` is the median of the times between them.
+    A family is its own truth: where the log has no reference, the filter's clean run is the truth. Epochs are where the
+    receiver gave something; ``timeline.interval`` is the median of the times between them.
 
     Attributes:
         name: the specification that builds it.
@@ -50,8 +53,6 @@ class RecordedScenario(Scenario):
         onset: latest time of epoch 0, the last clean epoch, s; None = a third of the way from the log's start to its
             end.
         horizon: epochs of the game; None = to the end of the log.
-        drag_off_rate: largest rate of the spoofed position per axis, m/s.
-        error_scale: metres of error that make a reward of 1.
         doubts: what is likely wrong with a log on which the filter is bad.
     """
 
@@ -70,11 +71,31 @@ class RecordedScenario(Scenario):
     tuning: FilterTuning
     onset: float | None = None
     horizon: int | None = None
-    drag_off_rate: tuple[float, float, float] = (4.0, 4.0, 4.0)
-    error_scale: float = 10.0
 
     def __post_init__(self) -> None:
         self._check_imu(self.epoch_time[self.first], self.epoch_time[self.last])
+
+    @property
+    def truth(self) -> RecordedFamily:
+        """Itself."""
+        return self
+
+    @property
+    @abstractmethod
+    def offers(self) -> tuple[str, ...]:
+        """What the filter gives to monitors beside innovations."""
+
+    @property
+    def facts(self) -> FilterFacts:
+        """What the designer of the filter knows."""
+        return FilterFacts(
+            self.name, self.timeline.interval, self.bias_sigma, self.offers, self.linear_model, matched=self.matched
+        )
+
+    @property
+    @abstractmethod
+    def unmeasured(self) -> Runs:
+        """Components of the measurement at each epoch after the alignment that only fill a column of the log, (E,)."""
 
     @property
     @abstractmethod
@@ -156,7 +177,7 @@ class RecordedScenario(Scenario):
         return len(self.epoch_time) - 1 if self.horizon is None else self.first + self.horizon
 
     @property
-    def timeline(self) -> Timeline:  # type: ignore[override]
+    def timeline(self) -> Timeline:
         """The epochs of the game."""
         time = self.epoch_time[self.first : self.last + 1]
         return Timeline(time, float(np.median(np.diff(time))))
@@ -375,3 +396,14 @@ class RecordedScenario(Scenario):
         raise ValueError(
             f"scenario {self.name!r}: a recorded log has no linear model: knowledge must be 'blind' and action 'rate'"
         )
+
+
+def recorded_family(scenario: Scenario) -> RecordedFamily:
+    """The filters of a recorded log.
+
+    Raises:
+        ValueError: the scenario is simulated.
+    """
+    if not isinstance(scenario.family, RecordedFamily):
+        raise ValueError(f"scenario {scenario.name!r} is no recorded log")
+    return scenario.family

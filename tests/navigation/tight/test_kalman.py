@@ -5,6 +5,7 @@ import pytest
 
 from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.navigation import kalman
+from spoofgym.navigation.batch import Weights
 from spoofgym.navigation.tight import kalman as tight_filter
 from spoofgym.navigation.tight.states import (
     CLOCK,
@@ -57,11 +58,11 @@ def some_covariance(n, seed):
 @pytest.mark.parametrize("observable", ["carrier", "rate"])
 def test_rows_of_h_are_the_derivatives_of_the_ranges(scenario, observable):
     """Central differences of the distance over 20 m, exact to the fourth power of 10 m / 20 000 km."""
-    geometry, slots = scenario.geometry, scenario.slots
+    geometry, slots = scenario.family.geometry, scenario.slots
     columns, values = observation_columns(slots, observable), observation_values(geometry, observable)
     k = 7
-    time = geometry.time[k] - scenario.start_time
-    truth = scenario.trajectory.position[round(time * scenario.trajectory.rate)]
+    time = geometry.time[k] - scenario.family.start_time
+    truth = scenario.truth.trajectory.position[round(time * scenario.truth.trajectory.rate)]
     present = geometry.present[k]
     for axis in range(3):
         step = 10.0 * np.eye(3)[axis]
@@ -78,8 +79,8 @@ def test_rows_of_h_are_the_derivatives_of_the_ranges(scenario, observable):
 
 
 def test_code_and_carrier_see_the_ionosphere_with_opposite_signs(scenario):
-    dynamics, elevation = scenario.tight_model().dynamics, scenario.geometry.elevation
-    first = round(scenario.onset * scenario.rate) - 1
+    dynamics, elevation = scenario.tight_model().dynamics, scenario.family.geometry.elevation
+    first = round(scenario.truth.onset * scenario.truth.rate) - 1
     matrix, states, slots = dense_observation(dynamics, 0), slot_states(scenario.slots), scenario.slots
     for s in np.flatnonzero(dynamics.present[0]):
         slant, mapping = obliquity(elevation[first, s]), troposphere_mapping(elevation[first, s])
@@ -126,21 +127,11 @@ def test_measurement_update_is_josephs(scenario):
     gain = covariance @ matrix.T @ inverse
     left = np.eye(n) - gain @ matrix
     expected = left @ covariance @ left.T + gain @ noise @ gain.T
-    innovation, response, whitened = np.empty((m, m)), np.empty((m, 3)), np.empty(m)
-    whitened_gain = np.empty((m, n))
-    nis = tight_filter.form_innovation(
-        residual,
-        covariance,
-        dynamics.columns,
-        dynamics.values[3],
-        dynamics.noise_variance[3],
-        innovation,
-        whitened_gain,
-        response,
-        whitened,
-        np.empty((m, n)),
-        np.empty((m, m)),
-    )
+    whitened_gain, formed = np.empty((m, n)), tight_filter.empty_innovations(1, m)
+    formed.residual[0] = residual
+    weights, work = Weights(np.ones(1), np.ones((1, m // 2), dtype=bool)), tight_filter.workspace(dynamics.ranges, n)
+    tight_filter.form_innovation(0, 3, dynamics.ranges, weights, covariance, whitened_gain, formed, work)
+    innovation, response, whitened = formed.covariance[0], formed.response[0], formed.whitened[0]
     corrected = error.copy()
     tight_filter.correct_error(whitened_gain, whitened, corrected)
     tight_filter.update_covariance(whitened_gain, covariance)
@@ -148,7 +139,7 @@ def test_measurement_update_is_josephs(scenario):
     np.testing.assert_allclose(corrected, error - gain @ residual, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(covariance, expected, rtol=1e-8, atol=1e-9)
     np.testing.assert_array_equal(covariance, covariance.T)
-    assert nis == pytest.approx(residual @ inverse @ residual, rel=1e-9)
+    assert formed.nis[0] == pytest.approx(residual @ inverse @ residual, rel=1e-9)
     np.testing.assert_allclose(response.T @ response, matrix[:, 6:9].T @ inverse @ matrix[:, 6:9], rtol=1e-9)
     np.testing.assert_allclose(response.T @ whitened, matrix[:, 6:9].T @ inverse @ residual, rtol=1e-9, atol=1e-12)
 

@@ -60,10 +60,13 @@ def test_it_is_the_filter_of_the_paper(auxiliary):
     attack = make_attack("ramp:0.4,direction=30,onset=12")
     simulation = Simulation(scenario, attack, (), None, 3, 5, demands=Demands(excludes=True))
     simulation.restart(np.arange(3))
-    navigator, motion, samples = simulation.navigator, scenario.motion(), scenario.tuning.samples
+    navigator, motion, samples = simulation.navigator, scenario.truth.motion(), scenario.family.tuning.samples
     oracles = [
         FilterOfMatrices(
-            scenario.tuning, motion.position[0] + state[:2], motion.velocity[0] + state[2:4], scenario.rule
+            scenario.family.tuning,
+            motion.position[0] + state[:2],
+            motion.velocity[0] + state[2:4],
+            scenario.family.rule,
         )
         for state in navigator.state
     ]
@@ -175,7 +178,7 @@ def test_a_standing_start_is_stationary():
     runs = 4000
     simulation = Simulation(make_scenario("song-robot:data=static,odometer=table-1"), None, (), None, runs, 0)
     simulation.reset()
-    factor = simulation.scenario._start
+    factor = simulation.scenario.family.start_factor
     variance, shared = (factor[6] ** 2).sum(), (factor[6] * factor[21]).sum()
     simulation.resolve()
     first = simulation.error[:, :2]
@@ -317,6 +320,6 @@ def test_bad_rules_are_refused(values, message):
 
 
 def test_bad_tunings_are_refused():
-    tuning = make_scenario(SHORT).tuning
+    tuning = make_scenario(SHORT).family.tuning
     with pytest.raises(ValueError, match="credible filter: fix_sigma must be a finite number greater than 0, got 0"):
         dataclasses.replace(tuning, fix_sigma=0.0)
