@@ -1,27 +1,34 @@
-"""Figures without a display: the one place where Matplotlib is asked for."""
+"""Figures of matplotlib, which is an optional dependency, without a window or a global state."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import importlib.util
+from typing import Any
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+MISSING = "a figure needs matplotlib: pip install 'spoofgym[report]'"
 
 
-def new_figure(**options: Any) -> Figure:
-    """An empty figure that needs no display.
+def can_draw() -> bool:
+    """Whether matplotlib is installed."""
+    return importlib.util.find_spec("matplotlib") is not None
+
+
+def new_figure(width: float, height: float, **options: Any) -> Any:
+    """An empty figure with a canvas for files and pixels.
 
     Args:
-        options: of `matplotlib.figure.Figure`.
+        width: inches.
+        height: inches.
+        options: of ``matplotlib.figure.Figure``.
 
     Raises:
-        ImportError: matplotlib is missing; the message names the extra to install.
+        ImportError: matplotlib is missing.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
-    figure = Figure(**options)
+        raise ImportError(MISSING) from error
+    figure = Figure(figsize=(width, height), **options)
     FigureCanvasAgg(figure)
     return figure

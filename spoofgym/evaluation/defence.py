@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.attacks import opponents
 from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_seat import EXCLUDE
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, play
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
@@ -89,7 +89,7 @@ class World:
         """A simulation with these random streams, a run each."""
         return Simulation(
             self.scenario,
-            opponents(self.attacks, self.clean),
+            spoofer_pool(self.attacks, self.clean),
             list(self.detectors),
             response,
             len(streams),

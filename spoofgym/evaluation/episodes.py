@@ -15,17 +15,13 @@ from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.geodesy import horizontal
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
 
 Act = Callable[[NDArray[np.float32]], NDArray[Any]]
 """Actions of a policy for observations (N, D)."""
 Result = TypeVar("Result", covariant=True)
-
-
-def horizontal(error: Floats) -> Floats:
-    """Length of the horizontal part of (N, 3) errors, (N,)."""
-    return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
 
 
 class Batch(Protocol):

@@ -12,7 +12,8 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, horizontal, play
+from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, play
+from spoofgym.geodesy import horizontal
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams

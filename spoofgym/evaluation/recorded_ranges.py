@@ -18,8 +18,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.episodes import horizontal
-from spoofgym.geodesy import position_difference
+from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import Fixes, interpolate, read_log
 from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.program import moved

@@ -99,7 +99,7 @@ class FilterBatch(ABC):
     def _carry(self, runs: Runs, epochs: Runs, auxiliary: Floats) -> None:
         """Carry runs over several epochs without any fix; called on slices of runs by threads.
 
-        Before each epoch the states are kept (`keep`). What is changed here, but for ``auxiliary``, stands in ``past``.
+        Before each epoch the states are kept (`keep`). ``past`` holds all that is changed here, except ``auxiliary``.
 
         Args:
             runs: which, (n,).

@@ -143,7 +143,7 @@ def defenders_figure(report: dict[str, Any], path: Path) -> None:
     pooled = [row for row in report["rows"] if _is_pooled(row)]
     held_out = any(row["held_out"] for row in pooled)
     rows = sorted((row for row in pooled if row["held_out"] == held_out), key=lambda row: -row["mean_error_m"])
-    figure = new_figure(figsize=(8.6, 0.3 * len(rows) + 1.8), dpi=120, layout="constrained")
+    figure = new_figure(8.6, 0.3 * len(rows) + 1.8, dpi=120, layout="constrained")
     axes = figure.add_subplot()
     places = {kind: [i for i, row in enumerate(rows) if report["kinds"][row["defender"]] == kind] for kind in LABELS}
     for kind, of_kind in places.items():

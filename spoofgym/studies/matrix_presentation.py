@@ -113,7 +113,7 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
     detectors, attacks, detected = values(report, "detection_probability")
     _, _, error = values(report, "mean_undetected_error_m")
     width, height = 1.9 + CELL[0] * len(attacks), 2.4 + CELL[1] * len(detectors)
-    figure = new_figure(figsize=(width, 2 * height), dpi=150, layout="constrained")
+    figure = new_figure(width, 2 * height, dpi=150, layout="constrained")
     above, below = figure.subplots(2, 1)
     labels = [names[name] for name in detectors]
     _heat(above, labels, attacks, detected, 100.0 * detected, "Blues", 1.0)
@@ -197,7 +197,7 @@ def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     curves.sort(key=_area, reverse=True)
     coloured = curves[:CURVES_DRAWN]
     coloured += [curve for curve in curves[CURVES_DRAWN:] if names[curve["detector"]] == "snapshot"]
-    figure = new_figure(figsize=(11.5, 5.2), dpi=120, layout="constrained")
+    figure = new_figure(11.5, 5.2, dpi=120, layout="constrained")
     roc, det = figure.subplots(1, 2)
     for curve in curves:
         if curve not in coloured:

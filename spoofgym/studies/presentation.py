@@ -100,7 +100,7 @@ def attackers_figure(report: dict[str, Any], path: Path) -> None:
     """Bars of the undetected error of each attacker, with intervals, beside the optimum and the upper bound."""
     played = [row for row in report["rows"] if row["mean_undetected_error_m"] is not None]
     bounds = {row["attacker"]: row["exact_undetected_error_m"] for row in report["rows"]}
-    figure = new_figure(figsize=(8.0, 0.55 * len(played) + 1.9), dpi=120, layout="constrained")
+    figure = new_figure(8.0, 0.55 * len(played) + 1.9, dpi=120, layout="constrained")
     axes = figure.add_subplot()
     for place, row in enumerate(reversed(played)):
         mean, (low, high) = row["mean_undetected_error_m"], row["ci95_m"]

@@ -47,7 +47,7 @@ def draw_side_by_side(diagrams: dict[str, StanfordDiagram], path: Path, heading:
     if not diagrams:
         raise ValueError("stanford: there must be a diagram to draw, got none")
     path = Path(path)
-    figure = new_figure(figsize=(1.2 + 6.0 * len(diagrams), 6.0), dpi=150, layout="constrained")
+    figure = new_figure(1.2 + 6.0 * len(diagrams), 6.0, dpi=150, layout="constrained")
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 

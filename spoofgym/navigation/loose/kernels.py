@@ -105,8 +105,8 @@ def carry(
 ) -> None:
     """Carry runs over so many epochs each, part by part: mechanization, covariance, and the state kept at the fix.
 
-    The states are kept before every epoch. The unaided solution minus the filter, auxiliary (N, 15), is carried by the
-    same Φ, or is none, (N, 0).
+    Each state is stored in the history before its epoch begins. ``auxiliary`` is the unaided solution minus the
+    filter's, which the transition Φ of the filter carries, too; its shape is (N, 15), or (N, 0) if disabled.
     """
     mean_force, residual_bias, mean = np.empty(3), np.empty(6), np.empty(NUM_NAVIGATION)
     transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
