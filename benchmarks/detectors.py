@@ -20,6 +20,7 @@ import numpy as np
 
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import DETECTORS, make_detector
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.program import give_json, program
 from spoofgym.scenarios import make_scenario
@@ -92,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"{row['what']:<24}{row['microseconds']:>9.0f} µs{row['filter_steps']:>8.3f} filter steps",
             file=sys.stderr if options.json == STDOUT else sys.stdout,
         )
-    report = {"schema_version": 1, "rows": rows}
+    report = {"schema_version": SCHEMA_VERSION, "rows": rows}
     give_json(report, options.json)
     return 0
 

@@ -20,6 +20,7 @@ from typing import Any
 
 from spoofgym.command_line import STDOUT, Parser, add_json, count, learner_seed, run_folder
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.learning import spoofer
 from spoofgym.learning.ppo import Settings
 from spoofgym.learning.run_folder import DEFAULT_STEPS, RunFolder
@@ -41,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     rows = [_row(options, seed) for seed in options.seeds]
     out = sys.stderr if options.json == STDOUT else sys.stdout
-    report = {"schema_version": 1, "kind": "learning", "rows": rows}
+    report = {"schema_version": SCHEMA_VERSION, "kind": "learning", "rows": rows}
     do_all(lambda: print("\n".join(map(_line, rows)), file=out), lambda: give_json(report, options.json))
     return 0
 

@@ -23,6 +23,7 @@ import spoofgym  # noqa: F401 - registers the environments
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.program import give_json, program
 
 SECONDS = 1.0
@@ -212,7 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     back = {depth: backtrack_epochs(depth) for depth in (5, 10, 20, 50)}
     with_package, without = import_seconds()
     report = {
-        "schema_version": 1,
+        "schema_version": SCHEMA_VERSION,
         "rows": rows,
         "backtrack_epochs": back,
         "import": {"spoofgym_seconds": with_package, "dependencies_seconds": without},

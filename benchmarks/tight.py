@@ -19,6 +19,7 @@ import numpy as np
 
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import make_detector
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.interface import Demands
 from spoofgym.program import give_json, program
 from spoofgym.scenarios import make_scenario
@@ -117,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 file=out,
                 flush=True,
             )
-    report = {"schema_version": 1, "rows": rows}
+    report = {"schema_version": SCHEMA_VERSION, "rows": rows}
     give_json(report, options.json)
     return 0
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import math
 from pathlib import Path
 from typing import NoReturn
 
-from spoofgym import files
+from spoofgym import figures, files
 
 STDOUT = "-"
 MOST_THREADS = 1024
@@ -91,8 +90,8 @@ def picture(text: str) -> Path:
     path = Path(text)
     if path.suffix.lower() not in files.PICTURES:
         raise argparse.ArgumentTypeError(f"a figure's name ends in {', '.join(files.PICTURES)}, got {text!r}")
-    if importlib.util.find_spec("matplotlib") is None:
-        raise argparse.ArgumentTypeError("a figure needs matplotlib: pip install 'spoofgym[report]'")
+    if not figures.can_draw():
+        raise argparse.ArgumentTypeError(figures.MISSING)
     return output(text)
 
 

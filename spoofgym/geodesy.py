@@ -16,6 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from spoofgym.kernels import njit
 
+AXES = ("east", "north", "up")
+"""Names of the components of a vector."""
+AXIS_LETTERS = "enu"
+"""One letter for each of `AXES`, as specifications spell them."""
 SEMI_MAJOR_AXIS = 6378137.0
 """Equatorial radius a, m (WGS-84)."""
 FLATTENING = 1.0 / 298.257223563
@@ -252,36 +256,10 @@ def ecef_to_geodetic(ecef: ArrayLike) -> NDArray[np.float64]:
     return _stack(pymap3d.ecef2geodetic(*_columns(ecef), deg=False)).reshape(np.shape(ecef))
 
 
-def geodetic_to_enu(position: ArrayLike, origin: ArrayLike) -> NDArray[np.float64]:
-    """Coordinates of a position in the plane that touches the ellipsoid below `origin` (exact at any distance).
-
-    Args:
-        position: (..., 3) latitude rad, longitude rad, height m.
-        origin: (3,) or (..., 3) the same.
-
-    Returns:
-        (..., 3) east, north, up, m.
-
-    Raises:
-        ValueError: An argument does not end in three components.
-    """
-    return _stack(pymap3d.geodetic2enu(*_columns(position), *_columns(origin), deg=False))
-
-
-def enu_to_geodetic(enu: ArrayLike, origin: ArrayLike) -> NDArray[np.float64]:
-    """The inverse of `geodetic_to_enu`.
-
-    Args:
-        enu: (..., 3) east, north, up, m.
-        origin: (3,) or (..., 3) latitude rad, longitude rad, height m.
-
-    Returns:
-        (..., 3) latitude rad, longitude rad, height m.
-
-    Raises:
-        ValueError: An argument does not end in three components.
-    """
-    return _stack(pymap3d.enu2geodetic(*_columns(enu), *_columns(origin), deg=False))
+def horizontal(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Length of the horizontal part, (...), of vectors (..., 2 or more) that begin with east and north."""
+    length: NDArray[np.float64] = np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)
+    return length
 
 
 def ecef_to_enu_rotation(position: ArrayLike) -> NDArray[np.float64]:

@@ -61,21 +61,6 @@ def attitude_matrix(
     return matrix
 
 
-def euler_angles(attitude: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Pitch, roll and yaw of an attitude; the inverse of `attitude_matrix` (pitch not at +-90 degrees).
-
-    Args:
-        attitude: (..., 3, 3) body to ENU.
-
-    Returns:
-        Pitch, roll (-pi, pi], yaw (-pi, pi] clockwise from north, rad, each of the leading shape.
-    """
-    pitch = np.arcsin(np.clip(attitude[..., 2, 1], -1.0, 1.0))
-    roll = np.arctan2(-attitude[..., 2, 0], attitude[..., 2, 2])
-    yaw = np.arctan2(attitude[..., 0, 1], attitude[..., 1, 1])
-    return pitch, roll, yaw
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def rotation(x: float, y: float, z: float) -> Matrix:
     """Exp of a rotation vector (Rodrigues; Groves 2013 eq 5.73): cos I + sin/angle [v x] + (1 - cos)/angle^2 v v^T.

@@ -131,6 +131,9 @@ class Simulation:
         self.clock_offset = np.zeros(num_runs)
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
+        for player in (attack, response):
+            if player is not None:
+                player.join(self)
         if scenario.random:
             require_clean_starts(scenario.name, list(self.detectors.values()), self._passing)
 
@@ -188,6 +191,7 @@ class Simulation:
         if self.confounders is not None:
             self.confounders.reset(runs, self.streams)
         if self.response is not None:
+            self.response.draw(runs, self.streams)
             self.response.reset(runs)
         pending = np.arange(len(runs))
         for _ in range(MAX_REDRAWS):
@@ -388,13 +392,10 @@ class Simulation:
             self.decision = self.response.decide(self._seen_by_response(self.epoch), self.alarm)
 
     def _decide_first(self, runs: Runs, epoch: Epoch) -> None:
-        """A copy of the response, for these runs alone, sees their epoch 0; the others see each epoch once."""
+        """The response sees epoch 0 of these runs; the others see each epoch once."""
         if self.response is not None:
-            part = copy.copy(self.response)
-            part.bind(len(runs))
-            part.reset(np.arange(len(runs)))
-            self.decision = self.decision.put(runs, part.decide(self._seen_by_response(epoch), self.alarm[runs]))
-            self.response.take(runs, part)
+            part = self.response.begin(runs, self._seen_by_response(epoch), self.alarm[runs])
+            self.decision = self.decision.put(runs, part)
 
 
 def _streams(seed: int | None, streams: RunStreams | None, num_runs: int) -> RunStreams:

@@ -37,7 +37,7 @@ class Trajectory:
         velocity: (n + 1, 3) ENU, m/s.
         position: (n + 1, 3) latitude rad, longitude rad, height m.
         angular_rate: (n, 3) body against inertial space, right, forward, up, rad/s; row i spans time[i] to time[i + 1].
-        specific_force: (n, 3) right, forward, up, m/s^2; likewise.
+        specific_force: (n, 3) right, forward, up, m/s^2; rows as in `angular_rate`.
     """
 
     rate: float

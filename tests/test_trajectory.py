@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from spoofgym.geodesy import EARTH_RATE, position_difference
-from spoofgym.mechanization import euler_angles
 from spoofgym.scenarios.liu_flight import LIU_END, liu_trajectory
 from spoofgym.trajectory import Accelerate, Climb, Straight, Turn, coordinated_bank, fly, smooth_step, smooth_step_rate
+from tests.attitudes import euler_angles
 
 START = (0.6, 1.9, 500.0)
 MANOEUVRES = (

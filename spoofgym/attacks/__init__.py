@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from spoofgym import validation
 from spoofgym.attacks.azimuth import FOI_ATTACKS, Azimuth
@@ -23,13 +22,13 @@ from spoofgym.attacks.fusion_ripper import FusionRipper
 from spoofgym.attacks.meaconing import Meaconing
 from spoofgym.attacks.noise_matched import NoiseMatched
 from spoofgym.attacks.partial import Partial
-from spoofgym.attacks.pool import POPULATIONS, AttackPool
+from spoofgym.attacks.pool import POPULATIONS
 from spoofgym.attacks.position_only import PositionOnly
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
 from spoofgym.attacks.range_attack import LiuSpoofer
 from spoofgym.attacks.song_mix import SongMix
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
-from spoofgym.specification import Specification, build, unnest
+from spoofgym.specification import build, unnest
 
 
 def _inside(owner: str, attack: str) -> Attack:
@@ -89,27 +88,3 @@ def make_attack(attack: str | Attack) -> Attack:
         ValueError: unknown name or option, or a value that does not fit; the message lists the valid ones.
     """
     return attack if isinstance(attack, Attack) else build(attack, ATTACKS, "attack")
-
-
-def opponents(attacks: str | Attack | Sequence[str | Attack], clean: float) -> AttackPool:
-    """The pool from which a defender's opponents are drawn.
-
-    Args:
-        attacks: a population by its name, with options; a pool, which keeps its own share; an attack; or several, which
-            then have equal weights.
-        clean: share of games without an attack.
-
-    Raises:
-        ValueError: an unknown attack, or a share that is given twice.
-    """
-    if isinstance(attacks, AttackPool):
-        return copy.deepcopy(attacks)
-    if isinstance(attacks, str) and Specification.parse(attacks).name in POPULATIONS:
-        if "clean" in Specification.parse(attacks).options:
-            given = validation.written(clean)
-            raise ValueError(f"the share of clean games is given by clean={given}, not in {attacks!r}")
-        pool = make_attack(f"{attacks},clean={float(clean)!r}")
-        assert isinstance(pool, AttackPool)
-        return pool
-    several = list(attacks) if isinstance(attacks, Sequence) and not isinstance(attacks, str) else [attacks]
-    return AttackPool([(copy.deepcopy(make_attack(item)), 1.0) for item in several], clean)

@@ -1,4 +1,4 @@
-"""The base class of attacks around another one."""
+"""The base class of attacks that wrap another attack and change part of it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from spoofgym.timeline import Timeline
 
 
 class AroundAttack(Attack):
-    """An attack that does what the one inside does, but for what a subclass changes.
+    """An attack that wraps another attack. It forwards every call to it; a subclass overrides what it changes.
 
     Attributes:
         kind: the registered name.
-        attack: the attack inside.
+        attack: the wrapped attack.
     """
 
     kind: str

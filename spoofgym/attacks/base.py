@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +26,14 @@ class Attack(ABC):
         needs_model: whether it must `study` the victim's filter.
         needs_velocity: whether the receiver must give velocity, too.
         needs_ranges: whether the filter must take ranges.
+        closed_loop: whether its offsets depend on what happens in the game, so that they cannot be told in advance.
     """
 
     onset: float | None = None
     needs_model: bool = False
     needs_velocity: bool = False
     needs_ranges: bool = False
+    closed_loop: bool = False
 
     @property
     @abstractmethod
@@ -68,6 +71,9 @@ class Attack(ABC):
 
     def meet(self, satellites: Runs) -> None:  # noqa: B027 - most attacks take all satellites
         """See the numbers of the satellites in the game, in increasing order, where the filter takes ranges."""
+
+    def join(self, simulation: Any) -> None:  # noqa: B027 - most attacks do not look at the game that they play in
+        """Take the `Simulation` that the attack plays in, when it has been set up; after all of the above."""
 
     def episode(self, runs: Runs, streams: RunStreams) -> Floats:
         """Start new episodes of some runs and look at all that they will send, (n, K+1, 3), m ENU."""

@@ -1,7 +1,7 @@
 """Random attacks for populations: each episode draws its shape, size, heading, onset and length anew.
 
-A family turns a block of uniform numbers per run into offsets. Every attack ends, in the game or with it, and the fixes
-are true again afterwards.
+A family turns a block of uniform numbers per run into offsets. Every attack ends during the game or together with it.
+After the end of an attack the fixes are true again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The base class of attacks whose offsets follow from the game alone: the same in every run and episode."""
+"""The base class of attacks whose offsets depend on the game alone and do not differ between runs or episodes."""
 
 from __future__ import annotations
 

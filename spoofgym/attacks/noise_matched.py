@@ -1,4 +1,4 @@
-"""An attack as large as the noise in every epoch, so that no epoch stands out."""
+"""An attack whose mean innovation is as large as the noise in every epoch, so that no epoch stands out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from spoofgym.arrays import Floats
 from spoofgym.attacks.fixed_offsets import FixedOffsets
 from spoofgym.attacks.profiles import EAST, heading
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose.mean import check_position_fix, offsets_of
+from spoofgym.navigation.loose.mean_maps import check_position_fix, offsets_of
 from spoofgym.specification import spell
 
 LEVEL = 1.0

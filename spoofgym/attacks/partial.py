@@ -1,4 +1,4 @@
-"""Another attack by a spoofer whose signals the receiver takes for a part of the satellites only."""
+"""An attack that captures only some of the satellites; it wraps another attack."""
 
 from __future__ import annotations
 

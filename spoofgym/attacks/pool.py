@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -39,8 +40,8 @@ class AttackPool(Attack):
         clean: share of runs without an attack.
         offsets: of the present episodes, (N, K+1, 3), m ENU.
         member: index of each run's opponent, (N,); -1 = none.
-        first: first epoch with an offset, (N,); K + 1 where there is none.
-        last: last epoch with an offset, (N,); 0 where there is none.
+        first: first epoch with an offset, (N,); K + 1 where there is none. An attack in closed loop begins at epoch 1.
+        last: last epoch with an offset, (N,); 0 where there is none. An attack in closed loop ends with the game.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class AttackPool(Attack):
             raise ValueError("a pool of attacks needs at least one member")
         self.clean = validation.share("pool of attacks", "clean", clean)
         self._members = [member for member, _ in members]
+        self.closed_loop = any(member.closed_loop for member in self._members)
         self.needs_model = any(member.needs_model for member in self._members)
         self.needs_velocity = any(member.needs_velocity for member in self._members)
         self.needs_ranges = any(member.needs_ranges for member in self._members)
@@ -100,17 +102,30 @@ class AttackPool(Attack):
         for member in self._members:
             member.meet(satellites)
 
+    def join(self, simulation: Any) -> None:
+        """Give every member the simulation that it plays in."""
+        for member in self._members:
+            member.join(simulation)
+
     def reset(self, runs: Runs, streams: RunStreams) -> None:
-        """Draw the opponents of new episodes, and all that these will do."""
+        """Draw the opponents of new episodes, and all that these will do, but for those in closed loop."""
         draws = np.array([streams(run, "opponent").random(2) for run in runs.tolist()])
         member = np.minimum(np.searchsorted(self._bounds, draws[:, 1], side="right"), len(self._members) - 1)
         self.member[runs] = np.where(draws[:, 0] < self.clean, CLEAN, member)
         self.offsets[runs] = 0.0
         for place, attack in enumerate(self._members):
             chosen = runs[self.member[runs] == place]
-            if len(chosen):
+            if not len(chosen):
+                continue
+            if attack.closed_loop:
+                attack.reset(chosen, streams)
+            else:
                 self.offsets[chosen] = attack.episode(chosen, streams)
         self.first[runs], self.last[runs] = spoofed_stretch(self.offsets[runs])
+        for place, attack in enumerate(self._members):
+            if attack.closed_loop:
+                chosen = runs[self.member[runs] == place]
+                self.first[chosen], self.last[chosen] = 1, self._timeline.num_epochs
 
     def active(self, clock: Clock) -> Flags:
         """Whether the receiver follows the spoofer, (N,): from the first offset of the episode to the last."""
@@ -118,7 +133,12 @@ class AttackPool(Attack):
 
     def offset(self, clock: Clock) -> Floats:
         """This epoch's offset, (N, 3), m ENU."""
-        return self.offsets[self._runs, np.maximum(clock.index, 0)]
+        index = np.maximum(clock.index, 0)
+        for place, attack in enumerate(self._members):
+            playing = np.flatnonzero(self.member == place) if attack.closed_loop else self._runs[:0]
+            if len(playing):
+                self.offsets[playing, index[playing]] = attack.offset(clock)[playing]
+        return self.offsets[self._runs, index]
 
     def velocity(self, clock: Clock, rate: Floats) -> Floats:
         """What each run's opponent adds to the velocity of the fix, (N, 3), m/s ENU."""

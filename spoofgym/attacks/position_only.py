@@ -1,4 +1,4 @@
-"""Another attack by a spoofer who moves the position of the fix and not its velocity."""
+"""An attack that moves the position of the fix but not its velocity; it wraps another attack."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Attacks that follow a profile laid down in advance, blind to the victim."""
+"""Attacks that follow a profile that is fixed in advance. They do not react to the victim."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy import special
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
+from spoofgym.geodesy import AXIS_LETTERS
 from spoofgym.navigation.interface import Clock
 from spoofgym.specification import spell
 from spoofgym.streams import RunStreams
@@ -18,7 +19,6 @@ from spoofgym.timeline import Timeline
 from spoofgym.validation import written
 
 EAST = 90.0
-AXES = "enu"
 
 
 def heading(direction: float) -> Floats:
@@ -132,7 +132,7 @@ class RandomProfile(Attack):
         self.variance = validation.non_negative(self.kind, "variance", variance)
         self.onset = None if onset is None else validation.time(self.kind, "onset", onset)
         text = validation.text(self.kind, "axes", axes)
-        if any(letter not in AXES or text.count(letter) > 1 for letter in text):
+        if any(letter not in AXIS_LETTERS or text.count(letter) > 1 for letter in text):
             raise ValueError(
                 f"{self.kind}: axes must be letters of 'enu', each at most once, got {validation.shown(axes)}"
             )
@@ -165,7 +165,7 @@ class RandomProfile(Attack):
         index = np.arange(timeline.num_epochs + 1)
         clock = Clock(index, timeline.times)
         self._runs = np.arange(num_runs)
-        self._columns = [AXES.index(letter) for letter in self.axes]
+        self._columns = [AXIS_LETTERS.index(letter) for letter in self.axes]
         self._elapsed = self.elapsed(clock)
         self._started = self.started(clock)
         self._ended = self.ended(clock)

@@ -1,4 +1,4 @@
-"""Another attack by a spoofer who knows only roughly where the vehicle is."""
+"""An attack whose spoofer knows only roughly where the vehicle is; it wraps another attack."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.around import AroundAttack
 from spoofgym.attacks.base import Attack
+from spoofgym.geodesy import AXES
 from spoofgym.navigation.interface import Clock
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.specification import nest, spell
@@ -17,7 +18,6 @@ from spoofgym.timeline import Timeline
 SIGMA = 0.3
 MOST_SIGMA = 1e6
 """m."""
-AXES = ("east", "north", "up")
 
 
 class TrackingError(AroundAttack):

@@ -1,4 +1,4 @@
-"""Acceleration of the GNSS positions against that of the accelerometers (Kwon and Shim 2020)."""
+"""A test that compares the acceleration of the GNSS positions with that of the accelerometers (Kwon and Shim 2020)."""
 
 from __future__ import annotations
 

@@ -18,27 +18,29 @@ from spoofgym.specification import spell
 class Detector(ABC):
     """A test on each epoch of N runs: alarm where the statistic exceeds the threshold.
 
-    A subclass says what it remembers in `bind`, forgets it for some runs in `reset`, and computes its statistic in
-    `update`. A detector with several tests reports the largest statistic_i / threshold_i against 1; calibration scales
-    all of them by one factor, which is then the threshold.
+    A subclass allocates its memory in `bind`, clears it for some runs in `reset`, and computes its statistic in
+    `update`. A detector with several tests returns the largest ratio statistic_i / threshold_i, and its threshold is 1.
+    Calibration multiplies all its thresholds by one factor; that factor is then the threshold of the detector.
 
     Attributes:
-        threshold: alarm where statistic > threshold; positive and finite, None until `bind` or calibration sets it.
-        arl0: the average run length between false alarms at the threshold, in epochs; None if unknown. Unless
-            ``calibrated`` it holds for white innovations (a matched filter) only.
-        arl0_interval: its 95 % interval, epochs; None unless ``calibrated``.
-        target_arl0: the ARL0 that was asked for, to which calibration sets the threshold; None if the threshold was
-            given otherwise.
-        calibrated: the threshold was set on clean runs, and ``arl0`` holds where they came from.
-        origin: where that was, as calibration calls it; None where a threshold was set by hand.
-        demands: what it asks of the navigator beside innovations, e.g. an unaided inertial solution.
+        threshold: the detector alarms if statistic > threshold. It is positive and finite, or None until `bind` or
+            calibration sets it.
+        arl0: average run length between false alarms at the threshold, epochs; None if unknown. If ``calibrated`` is
+            False, it holds only for white innovations (a matched filter).
+        arl0_interval: 95 % interval of ``arl0``, epochs; None if ``calibrated`` is False.
+        target_arl0: the ARL0 that the user requested and that calibration sets the threshold for; None if the threshold
+            was given in another way.
+        calibrated: whether the threshold was measured on clean runs. ``arl0`` then holds where these runs came from.
+        origin: where these runs came from, in the form that calibration uses; None if a user set the threshold.
+        demands: what the detector requests of the navigator beside innovations, e.g. an unaided inertial solution.
         needs: what the scenario must offer beside innovations, e.g. a linear model of the filter.
-        members: detectors within this one, which are calibrated before it.
-        needs_view: it reads the epoch's view, so that only simulated runs can calibrate it.
-        lacks_slope: its statistic grows along clean runs, and `set_slope` has not told yet how fast.
-        in_position: it tests axes of the position, so that ranges are turned into a position before it sees them
-            (`Innovation.in_position`).
-        memory: epochs that the statistic looks back, the present one left out; a warm start needs as many clean epochs.
+        members: detectors inside this one. They are calibrated before it.
+        needs_view: whether the detector reads the epoch's view. Only simulated runs can then calibrate it.
+        lacks_slope: whether the statistic grows along clean runs and `set_slope` has not been called yet.
+        in_position: whether the detector tests axes of the position. Ranges are then converted to a position before the
+            detector sees them (`Innovation.in_position`).
+        memory: number of epochs before the present one that the statistic depends on. A warm start needs as many clean
+            epochs.
     """
 
     threshold: float | None = None
@@ -75,9 +77,10 @@ class Detector(ABC):
 
     @abstractmethod
     def update(self, epoch: Epoch) -> Floats:
-        """The statistic after this epoch, (N,): real numbers, of which +inf is a certain alarm; NaN and -inf never are.
+        """Return the statistic after this epoch, (N,).
 
-        Whoever runs a detector calls `statistic_of`, which holds it to this.
+        Values are real numbers or +inf, which is a certain alarm. NaN and -inf are not allowed. Callers use
+        `statistic_of`, which checks this.
         """
 
     def set_threshold(

@@ -1,8 +1,8 @@
 """Chi-square tests of the innovation: of one epoch, and summed over a window.
 
 Under a matched filter the normalised innovation squared of a fix of dimension m is chi-square with m degrees of
-freedom, and independent from epoch to epoch. Where ranges are measured m is what is there, and it changes as satellites
-rise and set: the statistic is then brought to the degrees of freedom of all slots (`at_all_degrees`).
+freedom, and independent from epoch to epoch. If ranges are measured, m is the number of ranges of the epoch. It changes
+as satellites rise and set. The statistic is then converted to the degrees of freedom of all slots (`at_all_degrees`).
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from spoofgym.specification import spell
 
 DEFAULT_WINDOW = 60
 UP = "up"
-AXES = {"east": (1.0, 0.0, 0.0), "north": (0.0, 1.0, 0.0), UP: (0.0, 0.0, 1.0)}
+UNIT_VECTORS = {"east": (1.0, 0.0, 0.0), "north": (0.0, 1.0, 0.0), UP: (0.0, 0.0, 1.0)}
 
 
 def unit_vector(owner: str, direction: float | str) -> Floats:
@@ -30,12 +30,12 @@ def unit_vector(owner: str, direction: float | str) -> Floats:
         ValueError: it is none of these.
     """
     if isinstance(direction, str):
-        if direction in AXES:
-            return np.array(AXES[direction])
+        if direction in UNIT_VECTORS:
+            return np.array(UNIT_VECTORS[direction])
         try:
             direction = float(direction)
         except ValueError:
-            valid = ", ".join(AXES)
+            valid = ", ".join(UNIT_VECTORS)
             raise ValueError(
                 f"{owner}: direction must be {valid} or an azimuth in degrees, got {validation.shown(direction)}"
             ) from None

@@ -1,4 +1,4 @@
-"""What theory says about monitors that sum innovations to see a spoofer's tracking error (Kujur 2024, section 3).
+"""Theory of monitors that sum innovations in order to see a spoofer's tracking error (Kujur 2024, section 3).
 
 The spoofer replays true signals of a place that is off by its tracking error ν_k along the direction u, in metres. With
 γ the innovation of a matched filter, S its covariance and H its design matrix,
@@ -6,10 +6,11 @@ The spoofer replays true signals of a place that is off by its tracking error ν
     cumulative innovation (CI):              Σ γ_k' S_k⁻¹ γ_k,
     cumulative position-domain (CPI):        Σ s_k² / σ_s²,    s_k = u' H' S⁻¹ γ_k,    σ_s² = u' H' S⁻¹ H u,
 
-chi-square without spoofing. σ_s² is the information of one epoch on the position along u, 1/m². Missed detection comes
-three ways: the paper's formula for white tracking error, the paper's for coloured tracking error, and the exact one.
-The paper lets the filter ignore what it is fed; in truth an innovation sees little more than the first difference of
-the tracking error, so that white error is easier to detect than the paper says and coloured error harder.
+Both are chi-square without spoofing. σ_s² is the information of one epoch on the position along u, 1/m². The module has
+three formulas of missed detection: the paper's for white tracking error, the paper's for coloured tracking error, and
+the exact one. The paper neglects that the filter follows the spoofed measurements. In truth an innovation sees little
+more than the first difference of the tracking error. White error is therefore easier to detect than the paper says, and
+coloured error is harder to detect.
 """
 
 from __future__ import annotations
@@ -51,17 +52,6 @@ def ci_threshold(p_fa: float, num_epochs: int, num_measurements: int) -> float:
     """
     num_measurements = validation.epochs(OWNER, "num_measurements", num_measurements)
     return cpi_threshold(p_fa, validation.whole(OWNER, "num_epochs", num_epochs, 1) * num_measurements)
-
-
-def position_information(design: Floats, innovation_covariance: Floats) -> Floats:
-    """σ_s² = u' H' S⁻¹ H u (eq 20), (...), 1/m².
-
-    Args:
-        design: H u, what one metre along u does to the measurements, (..., m), their unit over m.
-        innovation_covariance: S, (..., m, m).
-    """
-    solved = np.linalg.solve(innovation_covariance, design[..., None])[..., 0]
-    return np.add.reduce(design * solved, axis=-1)
 
 
 def kappa(sigma: float, information: Floats | float) -> Floats:
@@ -112,19 +102,6 @@ def missed_detection_white(p_fa: float, num_epochs: int, kappa: Floats | float) 
     """
     ratio = 1.0 + validation.non_negatives(OWNER, "kappa", kappa)
     return special.gammainc(0.5 * num_epochs, 0.5 * cpi_threshold(p_fa, num_epochs) / ratio)
-
-
-def missed_detection_gaussian(p_fa: float, num_epochs: int, kappa: Floats | float) -> Floats:
-    """The same for many epochs, where (q - N) / √(2 N) goes from N(0, 1) to N(√(N/2) κ, (1 + κ)²) (eqs 43 to 45).
-
-    It shows how detection grows with N and κ. It is not for numbers: the tails are far off even at hundreds of epochs.
-
-    Raises:
-        ValueError: a value is out of range.
-    """
-    threshold = -special.ndtri(validation.probability(OWNER, "p_fa", p_fa))
-    shift = np.sqrt(0.5 * validation.whole(OWNER, "num_epochs", num_epochs, 1)) * np.asarray(kappa)
-    return special.ndtr((threshold - shift) / (1.0 + np.asarray(kappa)))
 
 
 def missed_detection_coloured(p_fa: float, information: Floats | float, tracking: Floats) -> float:

@@ -1,6 +1,6 @@
-"""The gates of two autopilots, as tests: PX4's on each axis by itself, ArduPilot's on east and north together.
+"""The gates of two autopilots as tests. PX4 tests each axis by itself, ArduPilot tests east and north together.
 
-Followed are ``EKF/ekf_helper.cpp`` in ``src/modules/ekf2`` of PX4-Autopilot at commit 012e542 and
+The tests follow ``EKF/ekf_helper.cpp`` in ``src/modules/ekf2`` of PX4-Autopilot at commit 012e542 and
 ``AP_NavEKF3_PosVelFusion.cpp`` in ``libraries/AP_NavEKF3`` of ArduPilot at commit 0005fc0.
 """
 

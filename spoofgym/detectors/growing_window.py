@@ -1,4 +1,4 @@
-"""A test of relative motion whose window grows for as long as it alarms (FOI-R-5687, 6.1)."""
+"""A test of relative motion whose window grows while the test alarms (FOI-R-5687, 6.1)."""
 
 from __future__ import annotations
 

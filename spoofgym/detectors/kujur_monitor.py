@@ -1,13 +1,14 @@
-"""The two monitors of Kujur 2024 side by side: long attacks by their tracking error, short ones by separation."""
+"""The two monitors of Kujur 2024 together: one sees long attacks by their tracking error, one sees short attacks."""
 
 from __future__ import annotations
 
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors import cpi_theory
-from spoofgym.detectors.cpi import AXES, UP, Cpi, unit_vector
+from spoofgym.detectors.cpi import UP, Cpi, unit_vector
 from spoofgym.detectors.ensemble import Ensemble
 from spoofgym.detectors.separation_bank import DEFAULT_P_FA, DEFAULT_P_MD, DEFAULT_WINDOW, SeparationBank
+from spoofgym.geodesy import AXES
 from spoofgym.navigation.interface import Epoch
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tight.tracking_response import projected_response
@@ -50,7 +51,7 @@ class KujurMonitor(Ensemble):
     ) -> None:
         validation.at_most_one(self.kind, p_fa=p_fa, arl0=arl0)
         self.n = validation.epochs(self.kind, "n", n, 1, validation.LONGEST_TABLE)
-        self.direction = validation.one_of(self.kind, "direction", direction, tuple(AXES))
+        self.direction = validation.one_of(self.kind, "direction", direction, AXES)
         self.p_fa = validation.probability(self.kind, "p_fa", DEFAULT_P_FA if p_fa is None else p_fa) / 2.0
         self.p_md_cpi = validation.probability(self.kind, "p_md_cpi", p_md_cpi)
         validation.probability(self.kind, "p_md_ss", p_md_ss)

@@ -33,11 +33,6 @@ def cdf(x: Floats | float, weights: Floats) -> Floats:
     return np.exp(log_cdf(x, weights))
 
 
-def sf(x: Floats | float, weights: Floats) -> Floats:
-    """P(Q > x); arguments and errors as in `log_cdf`. Below 1e-308 it is 0: take `log_sf` there."""
-    return np.exp(log_sf(x, weights))
-
-
 def log_cdf(x: Floats | float, weights: Floats) -> Floats:
     """log P(Q <= x), by the saddle-point approximation.
 

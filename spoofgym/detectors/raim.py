@@ -1,14 +1,15 @@
-"""Receiver autonomous integrity monitoring on innovations: do the code ranges of one epoch agree with each other?
+"""Receiver autonomous integrity monitoring on innovations: a test whether the code ranges of one epoch agree.
 
-The code innovations of S satellites have the covariance S_c, a block of S. A position d that is off and a clock that is
-off by b change them by G (d, b), G = [-e, 1], and the generalised least squares of these four unknowns leave the
+The code innovations z of S satellites have the covariance S_c, a block of the innovation covariance. A position error d
+and a clock error b change them by G (d, b) with G = [-e, 1]. Generalised least squares of these four unknowns leave the
 residual
 
     r = z - G (G'S_c⁻¹G)⁻¹ G'S_c⁻¹ z,      r'S_c⁻¹ r ~ chi-square with S - 4 degrees of freedom
 
-under a matched filter. What the filter believes about position and clock drops out of it, whatever its covariance: the
-residual is that of a receiver's own fix, made with the filter's knowledge of the other errors alone. L is lower
-triangular and the code comes first, so that the first S components of w = L⁻¹ z are the code whitened by S_c.
+under a matched filter. The residual does not depend on the filter's estimate of position and clock, or on their
+covariance. It is the residual of a fix that a receiver computes by itself with the filter's knowledge of the other
+errors. L is lower triangular and the code comes first, so the first S components of w = L⁻¹ z are the code whitened by
+S_c.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Generalised likelihood ratio of a ramp with unknown onset, rate and direction (Willsky and Jones 1976)."""
+"""A likelihood ratio test of a ramp with unknown onset, rate and direction (Willsky and Jones 1976)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Distance of one fix from the prediction: what ACNA is compared with (Song 2021)."""
+"""A test of the distance between one fix and its prediction; Song 2021 compares ACNA with it."""
 
 from __future__ import annotations
 

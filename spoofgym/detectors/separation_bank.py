@@ -1,4 +1,4 @@
-"""Solution separation in sequential, overlapping windows, with a protection level (Kujur 2024, section 5)."""
+"""A test by solution separation in sequential, overlapping windows, with a protection level (Kujur 2024, section 5)."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Solution separation and its protection level (Kujur 2024, section 5 and appendix E).
 
-The filter's position is compared with one that has coasted on inertia since its window was opened,
-d = u'(x_KF - x_coast) along the unit vector u. A position that spoofing has pulled away is still within the protection
-level unless d alarms, however it has been pulled: its error is d, which the threshold bounds, plus the error of the
-coasting, which no signal touches.
+The test compares the filter's position with a position that has coasted on inertia since its window was opened. Their
+separation along the unit vector u is d = u'(x_KF - x_coast). The error of the filter is d plus the error of the
+coasting. The threshold bounds d unless there is an alarm, and no signal can change the error of the coasting. The
+protection level therefore holds under any spoofing until d alarms.
 """
 
 from __future__ import annotations
@@ -15,26 +15,6 @@ from spoofgym import validation
 from spoofgym.arrays import Floats
 
 OWNER = "separation_theory"
-ROUNDING = 1e-9
-"""A variance of the separation that is negative by less than this share of the coasting's is 0."""
-
-
-def separation_sigma(direction: Floats, coasting: Floats, filtered: Floats) -> Floats:
-    """σ_ss = √(u' (P_coast - P_KF) u), standard deviation of d without spoofing (eq 50), (...), m.
-
-    Args:
-        direction: u, (n,) in the state.
-        coasting: P_coast, (..., n, n).
-        filtered: P_KF, (..., n, n), of the filter from which the coasting departed.
-
-    Raises:
-        ValueError: the filter is less certain than the coasting.
-    """
-    coasting_variance = _variance(direction, coasting)
-    variance = coasting_variance - _variance(direction, filtered)
-    if np.any(variance < -ROUNDING * coasting_variance):
-        raise ValueError(f"{OWNER}: P_coast - P_KF must not be negative along u, got {np.min(variance)!r}")
-    return np.sqrt(np.maximum(variance, 0.0))
 
 
 def separation_threshold(p_fa: float, num_windows: int, sigma: Floats | float) -> Floats:
@@ -44,7 +24,7 @@ def separation_threshold(p_fa: float, num_windows: int, sigma: Floats | float) -
         p_fa: probability of a false alarm at an epoch, shared equally by the open windows; as these are correlated, the
             truth is lower.
         num_windows: open at once.
-        sigma: σ_ss, any shape, m.
+        sigma: σ_ss = √(u' (P_coast - P_KF) u), the standard deviation of d without spoofing (eq 50), any shape, m.
 
     Raises:
         ValueError: a value is out of range.
@@ -75,8 +55,3 @@ def protection_level(threshold: Floats | float, p_md: float, coasting_sigma: Flo
 def _multiplier(name: str, probability: float, parts: int) -> float:
     """Q⁻¹ of a part of a probability."""
     return float(-special.ndtri(validation.probability(OWNER, name, probability) / parts))
-
-
-def _variance(direction: Floats, covariance: Floats) -> Floats:
-    """u' P u, (...)."""
-    return np.add.reduce(direction * np.add.reduce(covariance * direction, axis=-1), axis=-1)

@@ -1,4 +1,4 @@
-"""Separation of the filter's solution from one that has left out the last fixes (Kujur 2024)."""
+"""A test of the filter's solution against a solution without the last fixes (Kujur 2024)."""
 
 from __future__ import annotations
 

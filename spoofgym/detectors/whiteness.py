@@ -1,4 +1,4 @@
-"""Portmanteau test: are the whitened innovations white in time?"""
+"""A portmanteau test of whether the whitened innovations are white in time."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from spoofgym import validation
 from spoofgym.attacks.base import Attack
@@ -26,6 +26,9 @@ SCALES = (1e-6, 1e6)
 """Least and largest scale of an error, m, and largest cost of one."""
 
 Config = TypeVar("Config")
+Part = TypeVar("Part")
+Weighted: TypeAlias = str | Part | tuple[str | Part, float]
+"""A member of a pool: a specification or an object, or a pair of one of these and its weight."""
 
 
 def configure(kind: type[Config], arguments: dict[str, Any]) -> Config:
@@ -82,7 +85,7 @@ class SpooferConfig:
     action: str = "rate"
     fidelity: str = "linear"
     on_alarm: str = "end"
-    response: str | Response = "exclude"
+    response: str | Response | tuple[Weighted[Response], ...] = "exclude"
     forfeit: float = 1.0
     tracking_sigma: float = 0.0
     tracking_time: float = 0.0
@@ -125,7 +128,7 @@ class DefenderConfig:
     """
 
     scenario: str | Scenario = "foi-drive"
-    attacks: str | Attack | tuple[str | Attack, ...] = "training"
+    attacks: str | Attack | tuple[Weighted[Attack], ...] = "training"
     detectors: str | Detector | tuple[str | Detector, ...] = DEFENDER_DETECTORS
     fidelity: str = "linear"
     clean: float = 0.5

@@ -199,7 +199,7 @@ class DefenderEnv(SingleEnv):
     | Name | Default | Meaning |
     |---|---|---|
     | `scenario` | `"foi-drive"` | specification `name[:value][,key=value...]`, or a `Scenario` |
-    | `attacks` | `"training"` | a population ("training", "held-out"), an attack, or a tuple of attacks |
+    | `attacks` | `"training"` | a population ("training", "held-out"), an attack, a policy, or a pool, see below |
     | `detectors` | see the table above | specification or `Detector`, or a tuple of them |
     | `fidelity` | `"linear"` | "linear" (error states, one step per fix) or "strapdown" (IMU rate) |
     | `clean` | `0.5` | share of games without an attack |
@@ -215,6 +215,23 @@ class DefenderEnv(SingleEnv):
     Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
     valid. Numbers have limits far beyond what a game needs, so that nothing overflows and memory stays in bounds:
     `error_scale` and `error_clip` lie from 1e-6 to 1e6, `exclusion_cost` is 1e6 at most.
+
+    `attacks` names who sits opposite in the games that are not clean:
+
+    | Value | Who plays |
+    |---|---|
+    | `"training"`, `"held-out"` | a population of random attacks |
+    | `"ramp:0.5"`, or an `Attack` | one attack |
+    | `"policy:NAME"`, `"policy:FOLDER"` | a learned spoofer, published or in a run folder |
+    | `("ramp:0.5", "jump", "policy:runs/x")` | a pool: each game draws one of them at `reset` |
+    | `(("ramp:0.5", 2), ("policy:runs/x", 1))` | a pool with weights |
+    | `"pool:ramp:0.5/direction=45+policy:runs/x,weights=2+1"` | such a pool in one word, for the command line |
+
+    Within a `pool:` a part has `/` in place of its commas and `~` in place of `+`; a `policy:` keeps its slashes. A
+    learned spoofer sees what it was trained to see, by a shadow filter of its own; it plays from epoch 1 on. One that
+    needs what the game does not offer is refused when the game is built: other entries of its observation, the
+    statistics of a detector that is not among `detectors` (knowledge "full"), a scenario without a linear model
+    (knowledge "shadow" on most recorded logs).
 
     ## Vectorized environment
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import quantile
-from spoofgym.envs.observation import AXES, Field, Squash
+from spoofgym.envs.observation import Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
+from spoofgym.geodesy import AXES
 from spoofgym.kernels import njit
 from spoofgym.navigation.facts import RANGES
 from spoofgym.responses.onset import OnsetEstimator
@@ -20,7 +21,7 @@ from spoofgym.simulation import Simulation
 SHORT, LONG = 5, 10
 """Epochs of the signed means."""
 QUIET_P = 1e-3
-"""A fix is quiet whose NIS is exceeded with a greater probability under a matched filter; likewise the signed mean."""
+"""A fix is quiet if a matched filter exceeds its NIS with a greater probability. The signed mean has the same limit."""
 QUIET_EPOCHS = 5
 """Quiet fixes in a row after which a suspicion is dropped."""
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from spoofgym import validation
 from spoofgym.arrays import Runs
-from spoofgym.attacks import opponents
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_seat import DefenderOutcome, DefenderSeat, demands_on
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.envs.privileged import PrivilegedState
 from spoofgym.envs.view import OneSeatGame
 from spoofgym.scenario import Scenario
@@ -35,7 +35,7 @@ class DefenderGame(OneSeatGame):
         seat: the agent's.
         attacks: the population from which each lane draws its opponent.
         confounders: the receiver's outages and multipath.
-        privileged: called, it gives what a critic may know in training and no defender ever, (N, P).
+        privileged: function that returns the truth that a critic may see in training, (N, P). No defender sees it.
     """
 
     seat: DefenderSeat
@@ -54,8 +54,8 @@ class DefenderGame(OneSeatGame):
         Args:
             config: its arguments.
             num_lanes: N.
-            beside: detectors, with their thresholds, among which are all of the game's own: the simulation runs these,
-                the defender sees its own.
+            beside: detectors that the simulation runs, with thresholds set; empty = the detectors of ``config``. They
+                must include those of ``config``. The defender sees the statistics of its own detectors only.
             streams: random streams of the lanes; None = of fresh entropy, until the lanes are seeded.
             disturbances: of the receiver, in place of those of ``config``.
 
@@ -76,7 +76,7 @@ class DefenderGame(OneSeatGame):
         if missing:
             raise ValueError(f"detectors of the game are not among those beside it: {', '.join(sorted(missing))}")
         with validation.argument(OWNER, "attacks"):
-            self.attacks = opponents(config.attacks, config.clean)
+            self.attacks = spoofer_pool(config.attacks, config.clean)
         shares = Disturbances(outage_share=config.outage, multipath_share=config.multipath)
         self.confounders = Confounders(shares if disturbances is None else disturbances)
         simulation = Simulation(

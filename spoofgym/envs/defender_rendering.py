@@ -6,21 +6,19 @@ import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
+
+from spoofgym.envs.figure import ALARM, SAFE, STATISTICS, GameFigure, scale_ratios
+from spoofgym.geodesy import horizontal
 
 if TYPE_CHECKING:
     from spoofgym.envs.defender_game import DefenderGame
 
 ERROR, SIGMA, OFFSET = "#0072b2", "#56b4e9", "#d55e00"
-STATISTICS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-ALARM = "#c1121f"
 BANDS = (("attack", OFFSET, 0.18), ("multipath", "#e69f00", 0.25), ("outage", "0.5", 0.25))
-LARGEST_LINEAR = 5.0
-"""Statistics over their thresholds are drawn on a logarithmic scale where one exceeds this."""
 
 
-class DefenderFigure:
+class DefenderFigure(GameFigure):
     """Records lane 0 of a game and draws it.
 
     Raises:
@@ -29,22 +27,14 @@ class DefenderFigure:
 
     def __init__(self, game: DefenderGame) -> None:
         """Prepare to record ``game``."""
-        try:
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-            from matplotlib.figure import Figure
-        except ImportError as error:
-            raise DependencyNotInstalled("rendering needs matplotlib: pip install 'spoofgym[render]'") from error
+        super().__init__(game.simulation)
         self._game = game
-        self._figure = Figure(figsize=(9.6, 5.4), dpi=100)
-        self._canvas = FigureCanvasAgg(self._figure)
-        self._names = list(game.simulation.detectors)
         self.restart()
 
     def restart(self) -> None:
         """Forget the last game and record epoch 0 of the new one."""
-        self._rows: list[tuple[float, ...]] = []
         self._decided: list[tuple[bool, int]] = []
-        self.record()
+        super().restart()
 
     def record(self) -> None:
         """Keep the present epoch and what was decided on the one before."""
@@ -54,24 +44,20 @@ class DefenderFigure:
         if self._rows:
             self._decided.append((bool(game.seat.excluding[0]), int(game.simulation.navigator.backtracked[0])))
         covariance = epoch.view.position_covariance[0]
-        ratios = [float(epoch.statistics[n][0] / d.threshold) for n, d in game.simulation.detectors.items()]
         self._rows.append(
             (
                 epoch.time[0],
                 game.error[0],
-                float(np.hypot(*game.simulation.offset[0, :2])),
+                float(horizontal(game.simulation.offset[0])),
                 float(np.sqrt(covariance[0, 0] + covariance[1, 1])),
                 float(game.attacked[0]),
                 float(game.confounders.multipath[0, epoch.index[0]]),
                 float(not epoch.available[0]),
-                *ratios,
+                *self._ratios(),
             )
         )
 
-    def draw(self) -> NDArray[np.uint8]:
-        """The figure so far, (540, 960, 3)."""
-        rows = np.array(self._rows)
-        self._figure.clear()
+    def _draw(self, rows: NDArray[np.float64]) -> None:
         upper = self._figure.add_axes((0.08, 0.52, 0.895, 0.34))
         middle = self._figure.add_axes((0.08, 0.405, 0.895, 0.065), sharex=upper)
         lower = self._figure.add_axes((0.08, 0.105, 0.895, 0.255), sharex=upper)
@@ -82,18 +68,7 @@ class DefenderFigure:
         middle.tick_params(labelbottom=False)
         mean = float(rows[1:, 1].mean()) if len(rows) > 1 else float(rows[0, 1])
         horizon = self._game.scenario.timeline.num_epochs
-        self._figure.suptitle(
-            f"Epoch {len(rows) - 1} of {horizon}: error {rows[-1, 1]:.1f} m, mean so far {mean:.2f} m",
-            fontsize=13,
-            fontweight="bold",
-            y=0.975,
-        )
-        self._canvas.draw()
-        return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
-
-    def close(self) -> None:
-        """Free what was drawn."""
-        self._figure.clear()
+        self._headline(f"Epoch {len(rows) - 1} of {horizon}: error {rows[-1, 1]:.1f} m, mean so far {mean:.2f} m")
 
     def _draw_error(self, axes: Any, rows: NDArray[np.float64]) -> None:
         time, timeline = rows[:, 0], self._game.scenario.timeline
@@ -119,7 +94,7 @@ class DefenderFigure:
             axes.axvspan(
                 rows[place, 0] - 0.5 * interval,
                 rows[place, 0] + 0.5 * interval,
-                color=ALARM if excluded else "#2b7a3d",
+                color=ALARM if excluded else SAFE,
                 alpha=0.75 if excluded else 0.35,
                 linewidth=0,
             )
@@ -131,15 +106,8 @@ class DefenderFigure:
         axes.set_title("Fixes: green used, red excluded", fontsize=9, pad=3)
 
     def _draw_statistics(self, axes: Any, rows: NDArray[np.float64]) -> None:
-        largest = float(rows[:, 7:].max(initial=0.0))
-        if largest > LARGEST_LINEAR:
-            axes.set_yscale("log")
-            low, high = 0.01, 20.0 * largest
-        else:
-            low, high = 0.0, 1.45 * max(largest, 1.0)
-        axes.axhspan(1.0, high, color=ALARM, alpha=0.08, linewidth=0)
-        axes.axhline(1.0, color=ALARM, linestyle="--", linewidth=1)
+        scale_ratios(axes, rows[:, 7:], 20.0)
         for n, name in enumerate(self._names):
             axes.plot(rows[:, 0], rows[:, 7 + n], color=STATISTICS[n % len(STATISTICS)], label=name, linewidth=1.3)
-        axes.set(xlabel="time, s", ylabel="statistic / threshold", ylim=(low, high))
+        axes.set(xlabel="time, s")
         axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=4)

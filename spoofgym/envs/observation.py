@@ -13,9 +13,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats
+from spoofgym.geodesy import AXES
 from spoofgym.kernels import njit
-
-AXES = ("east", "north", "up")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym.attacks.pool import AttackPool
-from spoofgym.envs.observation import AXES, Field, Squash
+from spoofgym.envs.observation import Field, Squash
+from spoofgym.geodesy import AXES
 from spoofgym.sensors.confounders import Confounders
 from spoofgym.simulation import Simulation
 

@@ -5,27 +5,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
+
+from spoofgym.envs.figure import ALARM, SAFE, STATISTICS, GameFigure, scale_ratios
+from spoofgym.geodesy import horizontal
 
 if TYPE_CHECKING:
     from spoofgym.envs.spoofer_game import SpooferGame
 
 TRUE, ESTIMATED, SPOOFED = "#4d4d4d", "#0072b2", "#d55e00"
-STATISTICS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-ALARM, SAFE = "#c1121f", "#2b7a3d"
 SHARE_OF_TRACK = 0.2
 """Largest deviation in the ground track, as a share of its extent: smaller deviations are magnified up to it."""
 LEAST_DEVIATION = 30.0
 """Deviations are not magnified as if they were smaller than this, m: noise stays small in the drawing."""
 LARGEST_IN_METRES = 1000.0
 """Frames of the ground track that are wider than this are labelled in km, m."""
-LARGEST_LINEAR = 5.0
-"""Statistics over their thresholds are drawn on a logarithmic scale where one exceeds this."""
 ROUND_FACTORS = np.array([1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000])
 
 
-class SpooferFigure:
+class SpooferFigure(GameFigure):
     """Records lane 0 of a game and draws it.
 
     Raises:
@@ -34,34 +32,18 @@ class SpooferFigure:
 
     def __init__(self, game: SpooferGame) -> None:
         """Prepare to record ``game``."""
-        try:
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-            from matplotlib.figure import Figure
-        except ImportError as error:
-            raise DependencyNotInstalled("rendering needs matplotlib: pip install 'spoofgym[render]'") from error
-        self._game = game
-        self._figure = Figure(figsize=(9.6, 5.4), dpi=100)
-        self._canvas = FigureCanvasAgg(self._figure)
+        super().__init__(game.simulation)
         self._track = game.scenario.track()
-        self._names = list(game.simulation.detectors)
+        self._timeline = game.scenario.timeline
         self.restart()
-
-    def restart(self) -> None:
-        """Forget the last game and record epoch 0 of the new one."""
-        self._rows: list[tuple[float, ...]] = []
-        self.record()
 
     def record(self) -> None:
         """Keep the present epoch: time, error E and N, offset E and N, and each statistic over its threshold."""
-        simulation = self._game.simulation
+        simulation = self._simulation
         error, offset = simulation.error[0], simulation.offset[0]
-        ratios = [float(simulation.epoch.statistics[n][0] / d.threshold) for n, d in simulation.detectors.items()]
-        self._rows.append((simulation.epoch.time[0], error[0], error[1], offset[0], offset[1], *ratios))
+        self._rows.append((simulation.epoch.time[0], error[0], error[1], offset[0], offset[1], *self._ratios()))
 
-    def draw(self) -> NDArray[np.uint8]:
-        """The figure so far, (540, 960, 3)."""
-        rows = np.array(self._rows)
-        self._figure.clear()
+    def _draw(self, rows: NDArray[np.float64]) -> None:
         # fixed places: a layout engine would move the panels from frame to frame
         upper = self._figure.add_axes((0.53, 0.555, 0.445, 0.315))
         self._draw_track(self._figure.add_axes((0.075, 0.235, 0.36, 0.635)), rows)
@@ -69,15 +51,9 @@ class SpooferFigure:
         self._draw_statistics(self._figure.add_axes((0.53, 0.105, 0.445, 0.335), sharex=upper), rows)
         upper.tick_params(labelbottom=False)
         self._draw_headline(rows)
-        self._canvas.draw()
-        return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
-
-    def close(self) -> None:
-        """Free what was drawn."""
-        self._figure.clear()
 
     def _draw_headline(self, rows: NDArray[np.float64]) -> None:
-        epoch, horizon = len(rows) - 1, self._game.scenario.timeline.num_epochs
+        epoch, horizon = len(rows) - 1, self._timeline.num_epochs
         alarms = rows[1:, 5:] > 1  # epoch 0 is clean and does not count
         if alarms.any():
             first = int(np.argmax(alarms.any(axis=1)))
@@ -85,9 +61,9 @@ class SpooferFigure:
             verdict, colour = f"DETECTED at epoch {first + 1} by {who}", ALARM
         else:
             verdict, colour = "undetected to the end" if epoch == horizon else "not detected so far", SAFE
-        error = np.hypot(rows[-1, 1], rows[-1, 2])
+        error = float(horizontal(rows[-1, 1:3]))
         text = f"Epoch {epoch} of {horizon}: navigation error {error:.1f} m, {verdict}"
-        self._figure.suptitle(text, color=colour, fontsize=13, fontweight="bold", y=0.975)
+        self._headline(text, color=colour)
 
     def _draw_track(self, axes: Any, rows: NDArray[np.float64]) -> None:
         whole = self._track[:, :2]
@@ -117,39 +93,28 @@ class SpooferFigure:
 
     def _draw_error(self, axes: Any, rows: NDArray[np.float64]) -> None:
         time = rows[:, 0] - rows[0, 0]
-        offset, error = np.hypot(rows[:, 3], rows[:, 4]), np.hypot(rows[:, 1], rows[:, 2])
+        offset, error = horizontal(rows[:, 3:5]), horizontal(rows[:, 1:3])
         for values, label, colour in (
             (offset, "offset of the spoofed fix", SPOOFED),
             (error, "error of the estimate", ESTIMATED),
         ):
             axes.plot(time, values, color=colour, label=label, linewidth=2)
             axes.plot(time[-1], values[-1], "o", color=colour, markersize=5, clip_on=False, zorder=3)
-        axes.set(xlim=(0, self._duration()), ylabel="horizontal, m", title="Navigation error")
+        axes.set(xlim=(0, self._timeline.end - self._timeline.start), ylabel="horizontal, m", title="Navigation error")
         axes.set_ylim(0, 1.35 * max(float(offset.max()), float(error.max()), 5.0))
         axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=2)
 
     def _draw_statistics(self, axes: Any, rows: NDArray[np.float64]) -> None:
         time = rows[:, 0] - rows[0, 0]
-        largest = float(rows[:, 5:].max(initial=0.0))
-        if largest > LARGEST_LINEAR:
-            axes.set_yscale("log")
-            low, high = 0.01, 8.0 * largest
-        else:
-            low, high = 0.0, 1.45 * max(largest, 1.0)
-        axes.axhspan(1.0, high, color=ALARM, alpha=0.08, linewidth=0)
-        axes.axhline(1.0, color=ALARM, linestyle="--", linewidth=1, label="threshold")
+        scale_ratios(axes, rows[:, 5:], 8.0, "threshold")
         for n, name in enumerate(self._names):
             ratio, colour = rows[:, 5 + n], STATISTICS[n % len(STATISTICS)]
             axes.plot(time, ratio, color=colour, label=name, linewidth=1.5)
             axes.plot(time[-1], ratio[-1], "o", color=colour, markersize=5, clip_on=False, zorder=3)
             alarms = 1 + np.flatnonzero(ratio[1:] > 1)[:1]
             axes.plot(time[alarms], ratio[alarms], "X", color=ALARM, markersize=11, clip_on=False, zorder=4)
-        axes.set(xlabel="time since the last clean fix, s", ylabel="statistic / threshold", ylim=(low, high))
+        axes.set(xlabel="time since the last clean fix, s")
         axes.set_title(
             "Detector: alarm in the red zone" if len(self._names) < 2 else "Detectors: alarm in the red zone"
         )
         axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=3)
-
-    def _duration(self) -> float:
-        timeline = self._game.scenario.timeline
-        return timeline.end - timeline.start

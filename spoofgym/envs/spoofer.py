@@ -151,6 +151,7 @@ class SpooferEnv(SingleEnv):
       only): variance that the tracking error adds to what the CPI of Kujur et al. (2024) sums, over that which it has;
       1 / σ_s is the sigma of the position that the innovation asks for. Where κ is far below 1 the CPI has no power.
     - `clock_error`: estimate minus truth of the receiver's clock when last resolved, m (`coupling="tight"` only).
+    - `opponent`: name of the defender that the lane has drawn (where `response` is a pool only).
     - `outcome`: "diverged" if the filter diverged, "detected" if any alarm was raised in the game, else "undetected"
       (last step of a terminated game only).
     - `is_success`: whether "undetected" (with `outcome` only).
@@ -165,7 +166,7 @@ class SpooferEnv(SingleEnv):
     | `action` | `"rate"` | "rate" or "innovation" |
     | `fidelity` | `"linear"` | "linear" (error states, one step per fix) or "strapdown" (IMU rate) |
     | `on_alarm` | `"end"` | "end": an alarm ends the game; "respond": `response` decides and the game goes on |
-    | `response` | `"exclude"` | specification or `Response`; used with `on_alarm="respond"` only |
+    | `response` | `"exclude"` | who decides with `on_alarm="respond"`, see below |
     | `forfeit` | `1.0` | share of the growth that an alarm takes back |
     | `tracking_sigma` | `0.0` | see below, m |
     | `tracking_time` | `0.0` | correlation time of that error, s; 0: white |
@@ -195,6 +196,22 @@ class SpooferEnv(SingleEnv):
 
     With `on_alarm="respond"` nothing is taken back: the return times `error_scale` is the growth of the error
     whatever was detected. The shadow filter still assumes that every fix is used.
+
+    `response` names who sits opposite with `on_alarm="respond"`:
+
+    | Value | Who decides |
+    |---|---|
+    | `"exclude:reuse=5"`, or a `Response` | a response to the alarm of any detector |
+    | `"snapshot > exclude"` | a response to the alarm of one of the game's detectors alone |
+    | `"policy:NAME"`, `"policy:FOLDER"` | a learned defender, published or in a run folder |
+    | `("exclude", "px4-auto", "policy:runs/d")` | a pool: each game draws one of them at `reset` |
+    | `(("exclude", 2), ("policy:runs/d", 1))` | a pool with weights |
+    | `"pool:exclude:reuse=5+policy:runs/d,weights=2+1"` | such a pool in one word, for the command line |
+
+    Within a `pool:` a part has `/` in place of its commas and `~` in place of `+`; a `policy:` keeps its slashes. The
+    draw is seeded and independent of the number of lanes; `info["opponent"]` tells it. A learned defender sees what it
+    was trained to see. `detector` must therefore name the detectors that it was trained with, as they were spelled
+    then, and the scenario must have as many backtrack depths; else the game is refused when it is built.
 
     ## Vectorized environment
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym import validation
@@ -12,10 +13,10 @@ from spoofgym.arrays import Runs
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.opponents import make_defender
 from spoofgym.envs.spoofer_seat import OWNER, SpooferOutcome, SpooferSeat, frame_fields
 from spoofgym.envs.view import OneSeatGame
-from spoofgym.responses import make_response
-from spoofgym.responses.base import Response
+from spoofgym.responses.pool import ResponsePool
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
@@ -56,14 +57,13 @@ class SpooferGame(OneSeatGame):
         with validation.argument(OWNER, "detector"):
             detectors = calibrated_for_play(detectors, scenario, config.fidelity)
         with validation.argument(OWNER, "response"):
-            response: Response | None = deepcopy(make_response(config.response))
-        if config.on_alarm == "end":
-            response = None
+            defender = make_defender(config.response, scenario, detectors)
+        self._defenders = defender if config.on_alarm == "respond" and isinstance(defender, ResponsePool) else None
         simulation = Simulation(
             scenario,
             None,
             detectors,
-            response,
+            defender if config.on_alarm == "respond" else None,
             num_lanes,
             fidelity=config.fidelity,
             threads=config.threads,
@@ -85,3 +85,17 @@ class SpooferGame(OneSeatGame):
         """
         self.advance(rates=actions, restarting=restarting)
         return self.seat.outcome
+
+    def reset_values(self) -> dict[str, Any]:
+        """Infos after a reset, of all lanes."""
+        return {**super().reset_values(), **self._met()}
+
+    def step_values(self, outcome: SpooferOutcome) -> dict[str, Any]:
+        """Infos after a step, of all lanes."""
+        return {**super().step_values(outcome), **self._met()}
+
+    def _met(self) -> dict[str, Any]:
+        """Which defender each lane has drawn, where there is a pool of them."""
+        if self._defenders is None:
+            return {}
+        return {"opponent": np.array(self._defenders.names, dtype=object)[self._defenders.member]}

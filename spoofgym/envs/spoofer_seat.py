@@ -16,12 +16,13 @@ from spoofgym.detectors.cpi_theory import kappa
 from spoofgym.envs.actions import rates
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
-from spoofgym.envs.observation import AXES, Field, Squash, observation_space, spoofer_fields
-from spoofgym.envs.shadow import ShadowFilter, require_fitting, shadow_model
+from spoofgym.envs.observation import Field, Squash, observation_space, spoofer_fields
+from spoofgym.envs.shadow import shadow_filter
 from spoofgym.envs.standing import Standing, horizontal_error
-from spoofgym.envs.tight_shadow import TightShadowFilter
+from spoofgym.geodesy import AXES
 from spoofgym.navigation.facts import RANGES
 from spoofgym.navigation.interface import RangeNavigator
+from spoofgym.navigation.mean import MeanFilter
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
@@ -125,11 +126,11 @@ class SpooferSeat:
         fields = frame_fields(config, scenario, detectors, num_lanes)
         self.fields = stacked_fields(fields, config.frames)
         self._ranges = RANGES in scenario.offers
-        self.shadow: ShadowFilter | TightShadowFilter | None = None
+        self.shadow: MeanFilter | None = None
         if config.knowledge != "blind":
             with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):
                 believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
-                self.shadow = self._shadow_filter(believed)
+                self.shadow = shadow_filter(scenario, believed, num_lanes, simulation.slices)
         self.observation_space = observation_space(self.fields)
         limits = (*scenario.drag_off_rate, scenario.clock_rate) if self._ranges else scenario.drag_off_rate
         self.space = spaces.Box(-1.0, 1.0, (len(limits),), np.float32)
@@ -152,15 +153,6 @@ class SpooferSeat:
         self._nobody = np.zeros(num_lanes, dtype=bool)
         self._detectors = tuple(detectors)
         self._thresholds = np.array([simulation.detectors[name].threshold for name in detectors])
-
-    def _shadow_filter(self, believed: Scenario) -> ShadowFilter | TightShadowFilter:
-        """The filter of the scenario for which the spoofer takes the victim's, run in expectation."""
-        simulation = self.simulation
-        if not self._ranges:
-            model = shadow_model(simulation.scenario, believed)
-            return ShadowFilter(model, simulation.num_runs, simulation.slices)
-        require_fitting(simulation.scenario, believed)
-        return TightShadowFilter(believed.tight_model(), simulation.num_runs, simulation.slices)
 
     def draw(self, lanes: Runs) -> None:
         """Draw what is random of the spoofer in new games: how it errs about the vehicle's position."""
@@ -227,7 +219,7 @@ class SpooferSeat:
         index = self.simulation.epoch.index
         if self.config.action == "rate":
             return self.offset + actions * self._reach[np.minimum(index, self._horizon - 1)]
-        assert isinstance(self.shadow, ShadowFilter)
+        assert self.shadow is not None  # the configuration refuses a blind spoofer with this action
         return self.shadow.offset_for(np.minimum(index + 1, self._horizon), INNOVATION_UNIT * actions)
 
     def resolved(self, lanes: Runs | None = None) -> None:
@@ -281,11 +273,11 @@ class SpooferSeat:
         if self.config.tracking_sigma:
             velocity += self._tracking[self._all, epoch.index, 3:] / self._interval
         parts = [self.offset, (epoch.index / self._horizon)[:, None], velocity, self._tracking_sigma]
-        if self.shadow is not None:
-            mean = self.shadow.mean
-            parts += [self.shadow.whitened, self.shadow.coming, mean[:, 6:9], mean[:, 3:6]]
-            if isinstance(self.shadow, TightShadowFilter):
-                parts.append(self.shadow.clock[:, None])
+        shadow = self.shadow
+        if shadow is not None:
+            parts += [shadow.whitened, shadow.coming, shadow.position_error, shadow.velocity_error]
+            if self._ranges:
+                parts.append(shadow.clock_error[:, None])
             if self.config.knowledge == "full":
                 parts.append(epoch.innovation.in_position.whitened)
                 for name, threshold in zip(self._detectors, self._thresholds, strict=True):

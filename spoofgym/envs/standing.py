@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from spoofgym.arrays import Flags, Floats
+from spoofgym.geodesy import horizontal
 from spoofgym.simulation import Simulation
 
 
@@ -29,5 +28,4 @@ class Standing:
 
 def horizontal_error(simulation: Simulation) -> Floats:
     """Horizontal error of the estimate, (N,), m."""
-    error = simulation.error
-    return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
+    return horizontal(simulation.error)

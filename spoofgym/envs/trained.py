@@ -14,9 +14,9 @@ Config = TypeVar("Config", SpooferConfig, DefenderConfig)
 
 PLAYERS: dict[type, str] = {SpooferConfig: SPOOFER, DefenderConfig: DEFENDER}
 """Who is trained on an environment of a configuration."""
-ONE = ("scenario", "response", "fidelity")
+ONE = ("scenario", "fidelity")
 """Arguments that a run folder holds as the specification of one part."""
-SEVERAL = ("detector", "detectors", "attacks")
+SEVERAL = ("detector", "detectors", "attacks", "response")
 """Arguments that a run folder holds as one specification or as a list of them."""
 
 

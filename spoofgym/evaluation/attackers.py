@@ -13,6 +13,7 @@ from rich.console import Console
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
+from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.metrics import attacker_score, undetected_error
@@ -61,7 +62,8 @@ class Evaluation:
         for baseline in baselines:
             rows.append(self._row(baseline, optimum, console))
         for attack in attacks:
-            rows.append(self._row(Baseline(attack.name, "blind", attack, None), optimum, console))
+            knowledge = attack.knowledge if isinstance(attack, PolicySpoofer) else "blind"
+            rows.append(self._row(Baseline(attack.name, knowledge, attack, None), optimum, console))
         for policy in policies:
             with console.status(policy.name):
                 score = attacker_score(self.play_policy(policy))

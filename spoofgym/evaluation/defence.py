@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.attacks import opponents
 from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_seat import EXCLUDE
-from spoofgym.evaluation.monte_carlo import batches, horizontal
+from spoofgym.envs.opponents import spoofer_pool
+from spoofgym.evaluation.monte_carlo import batches
+from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching
@@ -90,7 +91,7 @@ class World:
         """A simulation of some episodes, the first of which is seeded ``seed``."""
         return Simulation(
             self.scenario,
-            opponents(self.attacks, self.clean),
+            spoofer_pool(self.attacks, self.clean),
             list(self.detectors),
             response,
             episodes,

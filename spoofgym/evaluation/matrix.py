@@ -9,8 +9,9 @@ import numpy as np
 from scipy import stats
 
 from spoofgym.arrays import Floats
+from spoofgym.calibration.thresholds import CONFIDENCE
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.metrics import CONFIDENCE, attacker_score
+from spoofgym.evaluation.metrics import attacker_score
 from spoofgym.evaluation.monte_carlo import WatchedEpisodes
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.scenario import Scenario

@@ -13,6 +13,7 @@ from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.envs.opponents import make_spoofer
 from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
@@ -139,7 +140,7 @@ class Matrix:
                 f"attack {lacking[0]!r} needs a matched filter and fixes without velocity, scenario "
                 f"{self.scenario.name!r} has not both"
             )
-        return [known.get(text) or make_attack(text) for text in asked if text in known or text not in ORACLES]
+        return [known.get(text) or make_spoofer(text) for text in asked if text in known or text not in ORACLES]
 
     def _detectors(self, given: Sequence[str]) -> list[Detector]:
         detectors = [make_detector(at_arl0(text, self.arl0)) for text in given]

@@ -10,7 +10,6 @@ import numpy as np
 from spoofgym.arrays import Floats
 from spoofgym.evaluation.monte_carlo import Episodes
 
-CONFIDENCE = 0.95
 NORMAL_95 = 1.959963984540054
 
 

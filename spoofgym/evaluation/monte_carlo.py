@@ -13,6 +13,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.geodesy import horizontal
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
@@ -82,11 +83,6 @@ class WatchedEpisodes:
         first, runs = epoch.argmin(axis=0), np.arange(n)
         alarm_epoch, alarm_error = self.alarm_epoch[first, runs], self.alarm_error[first, runs]
         return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
-
-
-def horizontal(error: Floats) -> Floats:
-    """Length of the horizontal part of (N, 3) errors, (N,)."""
-    return np.sqrt(error[:, 0] ** 2 + error[:, 1] ** 2)
 
 
 def batches(episodes: int, seed: int, size: int) -> Iterator[tuple[int, int]]:

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.monte_carlo import horizontal
-from spoofgym.geodesy import position_difference
-from spoofgym.kernels import njit
+from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import interpolate
-from spoofgym.mechanization import mechanize
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.clean_run import coasted_positions
 from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 from spoofgym.simulation import Simulation
 from spoofgym.validation import written
@@ -134,22 +132,10 @@ def held_out_errors(scenario: Scenario, begin: float) -> Floats | None:
             return None
         truth, _ = interpolate(reference, log.epoch_time[late])
         return horizontal(position_difference(clean.position[1:][late], truth))
-    position = np.empty((len(model.step), 3))
-    _coast(
-        clean.attitude,
-        clean.velocity,
-        clean.position,
-        clean.bias,
-        model.angular_rate,
-        model.specific_force,
-        model.step,
-        model.boundaries,
-        position,
-    )
     origin = clean.position[0]
     start = recorded_family(scenario).align_time
     ends = start + np.cumsum(model.step)
-    track = position_difference(position, origin)
+    track = position_difference(coasted_positions(model, clean), origin)
     at_fixes = position_difference(clean.position[:-1], origin)
     errors = []
     truth = position_difference(reference.position[own], origin)
@@ -161,31 +147,6 @@ def held_out_errors(scenario: Scenario, begin: float) -> Floats | None:
         share = 1.0 - (ends[step] - moment) / model.step[step]
         errors.append(before + share * (track[step] - before) - true)
     return horizontal(np.array(errors))
-
-
-@njit(cache=True, nogil=True)
-def _coast(
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
-    bias: Floats,
-    angular_rate: Floats,
-    specific_force: Floats,
-    step: Floats,
-    boundaries: Runs,
-    result: Floats,
-) -> None:
-    """Position at the end of each step, (n, 3); each epoch's samples start from the state after the fix before it."""
-    c, v, p = np.empty((3, 3)), np.empty(3), np.empty(3)
-    rate, force, unused = np.empty(3), np.empty(3), np.zeros(3)
-    for k in range(len(boundaries) - 1):
-        c[:, :], v[:], p[:] = attitude[k], velocity[k], position[k]
-        for i in range(boundaries[k], boundaries[k + 1]):
-            for a in range(3):
-                rate[a] = angular_rate[i, a] - bias[k, a]
-                force[a] = specific_force[i, a] - bias[k, 3 + a]
-            mechanize(c, v, p, rate, force, step[i], unused)
-            result[i] = p
 
 
 def _clean_alarms(scenario: Scenario, detectors: Sequence[Detector]) -> Flags:

@@ -19,8 +19,7 @@ from spoofgym.arrays import Flags, Floats
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
-from spoofgym.evaluation.monte_carlo import horizontal
-from spoofgym.geodesy import position_difference
+from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import Fixes, interpolate, read_log
 from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.program import do_all, give_json, program

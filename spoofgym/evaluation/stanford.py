@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spoofgym import files, validation
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.figures import new_figure
 
 NOMINAL, MISLEADING, HAZARDOUS, UNAVAILABLE = range(4)
 NAMES = ("nominal", "misleading", "hazardously misleading", "unavailable")
@@ -141,15 +142,10 @@ def draw_side_by_side(diagrams: dict[str, StanfordDiagram], path: Path, heading:
     if not diagrams:
         raise ValueError("stanford: there must be a diagram to draw, got none")
     path = Path(path)
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colors import LogNorm
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
-    figure = Figure(figsize=(1.2 + 6.0 * len(diagrams), 6.0), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(1.2 + 6.0 * len(diagrams), 6.0, dpi=150, layout="constrained")
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm
+
     most = max(2, max(int(diagram.counts.max()) for diagram in diagrams.values()))
     norm = LogNorm(1, most)
     panels = figure.subplots(1, len(diagrams), squeeze=False)[0]

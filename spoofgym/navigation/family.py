@@ -11,6 +11,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Demands, Innovation, Navigator, Spoof
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.mean import MeanFilter
 from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
@@ -88,6 +89,14 @@ class FilterFamily(Protocol):
 
     def white_innovations(self) -> WhiteInnovations:
         """What clean innovations at epochs 0..K are made of, where the filter is matched."""
+
+    def mean_filter(self, num_runs: int, slices: RunSlices) -> MeanFilter:
+        """The filter of ``num_runs`` games run in expectation, which is what a spoofer's shadow filter is.
+
+        Args:
+            num_runs: N.
+            slices: the threads to use.
+        """
 
     def blank_innovation(self, num_runs: int) -> Innovation:
         """An innovation of zeros, before there is any."""

@@ -11,7 +11,10 @@ from spoofgym.immutable import Immutable
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.interface import Innovation, Spoof
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose.mean import LooseMeanFilter
+from spoofgym.navigation.mean import MeanFilter
 from spoofgym.navigation.white import WhiteInnovations
+from spoofgym.parallel import RunSlices
 
 
 class FixFamily(Immutable, ABC):
@@ -43,6 +46,10 @@ class FixFamily(Immutable, ABC):
     def white_innovations(self) -> WhiteInnovations:
         """What clean innovations at epochs 0..K are made of, where the filter is matched."""
         return WhiteInnovations(self.linear_model().innovation_factor)
+
+    def mean_filter(self, num_runs: int, slices: RunSlices) -> MeanFilter:
+        """The filter of ``num_runs`` games run in expectation, every fix used."""
+        return LooseMeanFilter(self.linear_model(), num_runs, slices)
 
     def blank_innovation(self, num_runs: int) -> Innovation:
         """An innovation of zeros, before there is any."""

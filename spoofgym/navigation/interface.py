@@ -192,12 +192,15 @@ class Decision:
 
 @dataclass(frozen=True)
 class Demands:
-    """What the players of a game ask of its navigator, beyond using every fix; what nobody asks for is not allocated.
+    """What the players of a game request of its navigator, beyond using every fix.
+
+    The navigator allocates memory only for features that a player requests.
 
     Attributes:
-        excludes: a fix can be left out, reset to, or weighted: each run has a covariance of its own.
-        history: epochs that a decision can take back; 0 = none. Needs ``excludes``.
-        auxiliary: an inertial solution that no fix has corrected since the game began, after the burn-in.
+        excludes: decisions may leave a fix out, reset the filter to it, or change its weight. Each run then has its own
+            covariance.
+        history: number of epochs that a decision can take back; 0 = none. Needs ``excludes``.
+        auxiliary: the navigator also carries an inertial solution that no fix corrects after the burn-in.
     """
 
     excludes: bool = False
@@ -210,7 +213,7 @@ class Demands:
             raise ValueError("a history needs a covariance per run: excludes must be True")
 
     def __or__(self, other: Demands) -> Demands:
-        """What both ask for."""
+        """The features that at least one of two players requests."""
         return Demands(
             self.excludes or other.excludes, max(self.history, other.history), self.auxiliary or other.auxiliary
         )

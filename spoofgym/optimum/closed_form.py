@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose.mean import check_position_fix, offsets_of
+from spoofgym.navigation.loose.mean_maps import check_position_fix, offsets_of
 from spoofgym.optimum.play import Outcome, expected_play
 from spoofgym.optimum.response import azimuth_of, check_epochs, error_response, half_circle_sign
 from spoofgym.optimum.survival import check_threshold, log_survival

@@ -13,8 +13,8 @@ from scipy import sparse
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.geodesy import AXIS_LETTERS
 
-AXES = "enu"
 FORGOTTEN = 1e-12
 """Share of its first weight below which an EWMA has forgotten an epoch."""
 
@@ -111,5 +111,6 @@ def ewma(weight: float, limit: float) -> list[LinearTest]:
 def per_axis(name: str, weights: Floats, limit: float) -> list[LinearTest]:
     """The same weights (n,) on each axis of a position fix by itself: one test per axis."""
     return [
-        LinearTest(f"{name} {letter}", weights[:, None] * np.eye(3)[axis], limit) for axis, letter in enumerate(AXES)
+        LinearTest(f"{name} {letter}", weights[:, None] * np.eye(3)[axis], limit)
+        for axis, letter in enumerate(AXIS_LETTERS)
     ]

@@ -1,11 +1,9 @@
 """What a sequence of offsets is worth to the spoofer: the one place that computes survival and score.
 
-In expectation (Liu 2018, eqs 32-34; gains and transitions do not feel the spoofing):
+The filter in expectation (`navigation/loose/mean.py`) gives the mean whitened innovations u_k of epochs 1..K and the
+error e_K after the last fix. Then
 
-    e⁻_k = Φ_k e_{k-1}                      the error carried to epoch k
-    u_k  = L_k⁻¹ (H_k e⁻_k - s_k)           the mean whitened innovation
-    e_k  = e⁻_k - U_k u_k                   the error after the fix is used
-    score = |horizontal e_K| · Π_k P(χ²_m(|u_k|²) <= threshold)
+    score = |horizontal e_K| · Π_k P(χ²_m(|u_k|²) <= threshold).
 
 Against the snapshot test with a matched filter the innovations are white, so the product is exact; and the filter's own
 random error after the last update is independent of all innovations, so the mean of the error vector given survival is
@@ -22,9 +20,8 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.kernels import njit
-from spoofgym.navigation import kalman
-from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose.mean import expected_sequence
 from spoofgym.optimum.survival import check_threshold, evaluate
 
 HORIZONTAL = slice(6, 8)  # east and north of the position error
@@ -71,81 +68,21 @@ def expected_play(model: LinearModel, offsets: Floats, threshold: float) -> Outc
         raise ValueError("offsets must be finite")
     batch = offsets.shape[:-2]
     plays = np.ascontiguousarray(offsets).reshape(-1, num_epochs, 3)
-    dimension, columns = model.dimension, model.transition_columns
-    whitened = np.empty((len(plays), num_epochs, dimension))
+    whitened = np.empty((len(plays), num_epochs, model.dimension))
     final_error = np.empty((len(plays), 2))
     log_survival, survival, score = (np.empty(len(plays)) for _ in range(3))
     for b, play in enumerate(plays):
-        deviations = fix_deviations(model.time, play, dimension)
-        _recursion(
-            columns,
-            model.observation,
-            model.innovation_factor,
-            model.whitened_gain,
-            deviations,
-            whitened[b],
-            final_error[b],
-        )
+        whitened[b], error = expected_sequence(model, play)
+        final_error[b] = error[HORIZONTAL]
         log_survival[b], survival[b], score[b] = _worth(whitened[b], final_error[b], threshold)
     return Outcome(
         offsets=offsets,
-        whitened=whitened.reshape(*batch, num_epochs, dimension),
+        whitened=whitened.reshape(*batch, num_epochs, model.dimension),
         final_error=final_error.reshape(*batch, 2),
         log_survival=log_survival.reshape(batch),
         survival=survival.reshape(batch),
         score=score.reshape(batch),
     )
-
-
-def fix_deviations(time: Floats, offsets: Floats, dimension: int) -> Floats:
-    """What the spoofer adds to a whole fix: the position offset and, where the fix has a velocity, the offset's rate.
-
-    Args:
-        time: of epochs 0..K, (K+1,), s.
-        offsets: of epochs 1..K, (K, 3), m ENU; zero at epoch 0.
-        dimension: 3 (position) or 6 (position and velocity).
-
-    Returns:
-        (K, m), m and m/s.
-    """
-    if dimension == 3:
-        return offsets
-    increments = np.diff(offsets, axis=0, prepend=np.zeros((1, 3)))
-    return np.hstack((offsets, increments / np.diff(time)[:, None]))
-
-
-@njit(cache=True, nogil=True)
-def _recursion(
-    columns: Floats,
-    observation: Floats,
-    innovation_factor: Floats,
-    whitened_gain: Floats,
-    deviations: Floats,
-    whitened: Floats,
-    final_error: Floats,
-) -> None:
-    """The mean error through epochs 1..K (Liu 2018, eqs 32-34).
-
-    Args:
-        columns: the first nine rows of Φ by columns, epochs 0..K, (K+1, 15, 9).
-        observation: H, (K+1, m, 9).
-        innovation_factor: L, (K+1, m, m).
-        whitened_gain: U', (K+1, m, 15).
-        deviations: what the spoofer adds to the fixes, (K, m).
-        whitened: filled with u_k, (K, m).
-        final_error: filled with the horizontal e_K, (2,), m.
-    """
-    num_epochs, dimension = deviations.shape
-    error, no_noise, work, residual = np.zeros(NUM_STATES), np.zeros(NUM_STATES), np.empty(9), np.empty(dimension)
-    for k in range(1, num_epochs + 1):
-        kalman.predict_error(columns[k], no_noise, error, work)
-        for i in range(dimension):
-            residual[i] = -deviations[k - 1, i]
-            for j in range(9):
-                residual[i] += observation[k, i, j] * error[j]
-        kalman.whiten(innovation_factor[k], residual, whitened[k - 1])
-        kalman.correct_error(whitened_gain[k], whitened[k - 1], error)
-    final_error[:] = error[HORIZONTAL]
 
 
 @njit(cache=True, nogil=True)

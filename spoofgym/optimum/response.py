@@ -1,6 +1,8 @@
-"""The linear maps of the mean recursion of `play`, between offsets, innovations and the final horizontal error."""
+"""The linear maps between increments of the offset, mean innovations and the final horizontal error."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -8,6 +10,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose.mean_maps import expected_columns, final_response
 from spoofgym.optimum.play import HORIZONTAL
 
 
@@ -27,7 +30,7 @@ def check_epochs(model: LinearModel, num_epochs: object) -> None:
 def error_response(model: LinearModel, num_epochs: int) -> Floats:
     """How the innovation of each epoch moves the final horizontal error: e_M = Σ_k G_k u_k.
 
-    G_k = -(horizontal rows of Φ_M ... Φ_{k+1}) U_k, by the recursion of the rows backward from epoch M.
+    G_k = -(horizontal rows of Φ_M ... Φ_{k+1}) U_k.
 
     Args:
         model: the filter along the scenario.
@@ -38,38 +41,33 @@ def error_response(model: LinearModel, num_epochs: int) -> Floats:
     """
     rows = np.zeros((2, NUM_STATES))
     rows[:, HORIZONTAL] = np.eye(2)
-    response = np.empty((2, num_epochs, model.dimension))
-    for k in range(num_epochs, 0, -1):
-        response[:, k - 1] = -rows @ model.whitened_gain[k].T
-        rows = rows @ model.transition[k]
-    return response
+    return final_response(model, rows, num_epochs)
 
 
 def increment_maps(model: LinearModel) -> tuple[Floats, Floats]:
     """How the increments v_k = s_k - s_{k-1} of the offset (s_0 = 0) move the innovations and the final error.
 
-    Every column of the identity goes through the recursion of `play` at once.
+    Every column of the identity goes through the mean recursion at once.
 
     Returns:
         maps from the increments (K * 3,), m ENU, to the whitened innovations, (K * m, K * 3), and to the final
         horizontal error, m, (2, K * 3).
     """
-    num_epochs, dimension = model.num_epochs, model.dimension
-    error = np.zeros((NUM_STATES, num_epochs * 3))
-    offset = np.zeros((3, num_epochs * 3))
-    whitened = np.empty((num_epochs, dimension, num_epochs * 3))
-    for k in range(1, num_epochs + 1):
-        increment = np.zeros((3, num_epochs * 3))
+    num_columns = model.num_epochs * 3
+    whitened, error = expected_columns(model, _unit_increments(model), num_columns)
+    return whitened.reshape(model.num_epochs * model.dimension, num_columns), error[HORIZONTAL]
+
+
+def _unit_increments(model: LinearModel) -> Iterator[Floats]:
+    """What each unit increment has added to the fix at epochs 1..K, (m, K * 3) each."""
+    num_columns = model.num_epochs * 3
+    offset = np.zeros((3, num_columns))
+    for k in range(1, model.num_epochs + 1):
+        increment = np.zeros((3, num_columns))
         increment[:, 3 * (k - 1) : 3 * k] = np.eye(3)
         offset += increment
-        deviation = offset if dimension == 3 else np.vstack((offset, increment / (model.time[k] - model.time[k - 1])))
-        error = model.transition[k] @ error
-        residual = model.observation[k] @ error[:9] - deviation
-        factor = model.innovation_factor[k]
-        for a in range(dimension):  # forward substitution: a LAPACK call for 3 rows costs more than it computes
-            whitened[k - 1, a] = (residual[a] - factor[a, :a] @ whitened[k - 1, :a]) / factor[a, a]
-        error -= model.whitened_gain[k].T @ whitened[k - 1]
-    return whitened.reshape(num_epochs * dimension, num_epochs * 3), error[HORIZONTAL]
+        rate = increment / (model.time[k] - model.time[k - 1])
+        yield offset if model.dimension == 3 else np.vstack((offset, rate))
 
 
 def azimuth_of(horizontal: Floats) -> float:

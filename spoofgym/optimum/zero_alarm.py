@@ -24,7 +24,7 @@ from scipy.optimize import linprog
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose.mean import check_position_fix, offsets_of
+from spoofgym.navigation.loose.mean_maps import check_position_fix, offsets_of
 from spoofgym.optimum.linear_tests import LinearTest
 from spoofgym.optimum.ramp import axis_limits
 from spoofgym.optimum.response import azimuth_of, error_response, half_circle_sign, horizontal_unit, increment_maps

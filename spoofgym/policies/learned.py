@@ -20,6 +20,7 @@ from typing_extensions import Self
 
 from spoofgym import files
 from spoofgym.archive import read_arrays
+from spoofgym.policies.network import affine
 
 POLICY_FILE = "policy.npz"
 CONFIG_FILE = "config.json"
@@ -87,11 +88,11 @@ class LearnedPolicy:
         return self.folder.resolve().name
 
     def outputs(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What the last layer gives for observations (N, D)."""
+        """What the last layer gives for observations (N, D); a row of it depends on its own observation alone."""
         hidden = observation
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
-            hidden = np.tanh(hidden @ weight.T + bias)
-        return hidden @ self.weights[-1].T + self.biases[-1]
+            hidden = np.tanh(affine(hidden, weight, bias))
+        return affine(hidden, self.weights[-1], self.biases[-1])
 
     def check_layout(self, layout: Sequence[str]) -> None:
         """Refuse an observation that has other entries than the policy was trained on.

@@ -1,6 +1,6 @@
 """The two ways in which ArduPilot's EKF3 treats a GNSS fix that fails its gates.
 
-Followed is ``libraries/AP_NavEKF3`` on the master branch of ArduPilot at commit 0005fc0:
+The module follows ``libraries/AP_NavEKF3`` on the master branch of ArduPilot at commit 0005fc0:
 ``AP_NavEKF3_PosVelFusion.cpp``, ``AP_NavEKF3_Control.cpp`` and ``AP_NavEKF3.h``.
 """
 

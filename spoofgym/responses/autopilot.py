@@ -1,4 +1,4 @@
-"""What the autopilots' filters have in common: gates on the innovation, and a clock since the last fix used."""
+"""The common part of the autopilots' filters: gates on the innovation, and a clock since the last fix used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exclusion with a fixed backtrack (FOI-R-5687)."""
+"""A response that excludes GNSS and goes back a fixed number of epochs (FOI-R-5687)."""
 
 from __future__ import annotations
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 
 from spoofgym.arrays import Flags, Runs, take_runs
 from spoofgym.navigation.interface import Decision, Demands, Epoch
+from spoofgym.streams import RunStreams
 
 
 def given(epoch: Epoch) -> Flags:
@@ -38,8 +41,32 @@ class Response(ABC):
         """Allocate the memory of ``num_runs`` runs."""
         self._num_runs = num_runs
 
+    def join(self, simulation: Any) -> None:  # noqa: B027 - most responses see no more than each epoch
+        """Take the `Simulation` that the response decides in, when it has been set up; after `bind`."""
+
+    def draw(self, runs: Runs, streams: RunStreams) -> None:  # noqa: B027 - most responses know no chance
+        """Draw what is random of new episodes, from the stream "defender" of each run; before `reset`."""
+
     def reset(self, runs: Runs) -> None:  # noqa: B027 - a response without a memory has nothing to forget
         """Forget everything about these runs."""
+
+    def begin(self, runs: Runs, epoch: Epoch, alarm: Flags) -> Decision:
+        """See epoch 0 of some runs alone, as `decide` does; the others see nothing.
+
+        Args:
+            runs: n indices.
+            epoch: that of these runs.
+            alarm: whether any detector alarms, (n,).
+
+        Returns:
+            The decisions on these runs.
+        """
+        part = copy.copy(self)
+        part.bind(len(runs))
+        part.reset(np.arange(len(runs)))
+        decision = part.decide(epoch, alarm)
+        self.take(runs, part)
+        return decision
 
     @abstractmethod
     def decide(self, epoch: Epoch, alarm: Flags) -> Decision:

@@ -1,4 +1,4 @@
-"""Exclusion that goes back to a stretch of constant velocity, which FOI-R-5687 proposes."""
+"""A response that excludes GNSS and goes back to a stretch of constant velocity (proposed by FOI-R-5687)."""
 
 from __future__ import annotations
 

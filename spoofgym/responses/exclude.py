@@ -1,4 +1,4 @@
-"""The simplest responses: none, leaving the fix out while an alarm lasts, and leaving GNSS out for good."""
+"""The simplest responses: use every fix, leave fixes out while an alarm lasts, or leave GNSS out for good."""
 
 from __future__ import annotations
 

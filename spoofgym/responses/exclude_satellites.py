@@ -1,14 +1,15 @@
-"""Leaving single satellites out, and taking them back when they agree with the others again.
+"""A response that leaves out single satellites, and uses them again when they agree with the others.
 
-Each satellite has two innovations, of its code and of its carrier or range rate. The codes together may be off by a
-position and a clock, and so may the carriers (the rates by a velocity and a clock's rate): G of eight columns. A
-satellite that is off by itself adds a combination of the two columns F_i of L⁻¹ that belong to it. With M the projector
-that takes L⁻¹G and the columns of the satellites left out away,
+Each satellite has two innovations: one of its code, one of its carrier or range rate. A common error of position and
+clock changes all codes, another one changes all carriers (an error of velocity and clock rate changes all range rates).
+The matrix G of these errors has eight columns. An error of one satellite alone is a combination of its two columns F_i
+of L⁻¹. Let M be the projector that removes L⁻¹G and the columns of the satellites that are left out. Then
 
     t_i² = w'M F_i (F_i'M F_i)⁻¹ F_i'M w,
 
-chi-square with two degrees of freedom under a matched filter: what it measures less what the others predict (Baarda
-1968, for two at once). What the filter believes about position, velocity and clock drops out.
+is chi-square with two degrees of freedom under a matched filter. It compares the measurements of a satellite with the
+prediction by the others (Baarda 1968, for two measurements at once). It does not depend on the filter's estimate of
+position, velocity and clock.
 """
 
 from __future__ import annotations

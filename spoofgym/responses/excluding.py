@@ -1,4 +1,4 @@
-"""What all responses have in common that leave GNSS out after an alarm."""
+"""The base class of responses that leave GNSS out after an alarm."""
 
 from __future__ import annotations
 

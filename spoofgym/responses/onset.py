@@ -1,4 +1,4 @@
-"""When the innovations began to lean to one side: an estimate of the onset of spoofing."""
+"""An estimate of the onset of spoofing: the epoch at which the innovations began to lean to one side."""
 
 from __future__ import annotations
 

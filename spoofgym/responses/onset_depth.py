@@ -1,4 +1,4 @@
-"""Exclusion that goes back to where the innovations began to lean."""
+"""A response that excludes GNSS and goes back to the estimated onset of spoofing."""
 
 from __future__ import annotations
 

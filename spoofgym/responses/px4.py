@@ -1,6 +1,6 @@
 """The two ways in which PX4's EKF2 treats a GNSS fix that fails its gates.
 
-Followed is ``src/modules/ekf2`` on the main branch of PX4-Autopilot at commit 012e542:
+The module follows ``src/modules/ekf2`` on the main branch of PX4-Autopilot at commit 012e542:
 ``EKF/aid_sources/gnss/gps_control.cpp``, ``EKF/ekf_helper.cpp``, ``EKF/common.h`` and ``params_gnss.yaml``.
 """
 

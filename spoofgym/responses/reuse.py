@@ -1,4 +1,4 @@
-"""When GNSS is used again after it has been left out."""
+"""The rule by which GNSS is used again after it was left out."""
 
 from __future__ import annotations
 

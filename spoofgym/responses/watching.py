@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from typing import Any
 
 from spoofgym.arrays import Flags, Runs
 from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.navigation.interface import Decision, Epoch
 from spoofgym.responses.base import Response
+from spoofgym.streams import RunStreams
 
 
 class Watching(Response):
@@ -43,9 +45,21 @@ class Watching(Response):
         self._response = copy.copy(self._response)
         self._response.bind(num_runs)
 
+    def join(self, simulation: Any) -> None:
+        """Give the response the simulation that it decides in."""
+        self._response.join(simulation)
+
+    def draw(self, runs: Runs, streams: RunStreams) -> None:
+        """Draw what is random of the response."""
+        self._response.draw(runs, streams)
+
     def reset(self, runs: Runs) -> None:
         """Forget everything about these runs."""
         self._response.reset(runs)
+
+    def begin(self, runs: Runs, epoch: Epoch, alarm: Flags) -> Decision:
+        """The response's decision on epoch 0 of some runs alone."""
+        return self._response.begin(runs, epoch, epoch.statistics[self._detector] > self._threshold)
 
     def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
         """The response's decision on the alarm of the one detector."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from spoofgym.arrays import Floats
+from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.mechanization import mechanize
 from spoofgym.navigation.divergence import FilterDivergedError, diverged_error
@@ -102,6 +103,38 @@ def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> Ti
     return TightCleanRun(*parts)
 
 
+class Starts(NamedTuple):
+    """States from which coasting starts.
+
+    Attributes:
+        attitude: body to ENU, (k, 3, 3).
+        velocity: ENU, (k, 3), m/s.
+        position: latitude rad, longitude rad, height m, (k, 3).
+        bias: estimated, (k, 6), rad/s and m/s².
+    """
+
+    attitude: Floats
+    velocity: Floats
+    position: Floats
+    bias: Floats
+
+
+class Samples(NamedTuple):
+    """Inertial samples that follow the states.
+
+    Attributes:
+        angular_rate: (n, 3), rad/s.
+        specific_force: (n, 3), m/s².
+        step: duration of each, (n,), s.
+        boundaries: first sample after each state, and n, (k + 1,).
+    """
+
+    angular_rate: Floats
+    specific_force: Floats
+    step: Floats
+    boundaries: Runs
+
+
 def coast(model: StrapdownModel, run: CleanRun, epoch: int) -> tuple[Floats, Floats]:
     """The filter's velocity on the way to an epoch, by inertial samples from the state after the epoch before.
 
@@ -114,39 +147,53 @@ def coast(model: StrapdownModel, run: CleanRun, epoch: int) -> tuple[Floats, Flo
         Times of the samples' ends, the epoch before first, (n + 1,), s, and velocities, (n + 1, 3), ENU, m/s.
     """
     samples = slice(model.boundaries[epoch], model.boundaries[epoch + 1])
-    velocity = np.empty((samples.stop - samples.start + 1, 3))
-    _coast(
-        run.attitude[epoch].copy(),
-        run.velocity[epoch].copy(),
-        run.position[epoch].copy(),
-        run.bias[epoch],
-        model.angular_rate[samples],
-        model.specific_force[samples],
-        model.step[samples],
-        velocity,
-    )
-    time = model.time[epoch] - np.append(np.cumsum(model.step[samples][::-1])[::-1], 0.0)
-    return time, velocity
+    step = model.step[samples]
+    one = slice(epoch, epoch + 1)
+    start = Starts(run.attitude[one], run.velocity[one], run.position[one], run.bias[one])
+    ends = np.array([0, len(step)])
+    _, velocity = _coasted(start, Samples(model.angular_rate[samples], model.specific_force[samples], step, ends))
+    time = model.time[epoch] - np.append(np.cumsum(step[::-1])[::-1], 0.0)
+    return time, np.vstack([run.velocity[one], velocity])
+
+
+def coasted_positions(model: StrapdownModel, run: CleanRun) -> Floats:
+    """The position at the end of every inertial sample; each epoch's samples start from the state after the fix before.
+
+    Args:
+        model: of the log.
+        run: on it.
+
+    Returns:
+        Latitude rad, longitude rad, height m, (n, 3).
+    """
+    starts = Starts(run.attitude, run.velocity, run.position, run.bias)
+    samples = Samples(model.angular_rate, model.specific_force, model.step, model.boundaries)
+    return _coasted(starts, samples)[0]
+
+
+def _coasted(starts: Starts, samples: Samples) -> tuple[Floats, Floats]:
+    """Position and velocity at the end of every sample, (n, 3) each."""
+    position, velocity = np.empty((2, len(samples.step), 3))
+    _coast(starts, samples, position, velocity)
+    return position, velocity
 
 
 @njit(cache=True, nogil=True)
-def _coast(
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
-    bias: Floats,
-    angular_rate: Floats,
-    specific_force: Floats,
-    step: Floats,
-    result: Floats,
-) -> None:
-    """Mechanize samples less the biases from a state, in place; the velocity before and after each, (n + 1, 3)."""
-    unused = np.zeros(3)
-    result[0] = velocity
-    for i in range(len(step)):
-        rate, force = angular_rate[i] - bias[:3], specific_force[i] - bias[3:]
-        mechanize(attitude, velocity, position, rate, force, step[i], unused)
-        result[i + 1] = velocity
+def _coast(starts: Starts, samples: Samples, position: Floats, velocity: Floats) -> None:
+    """Mechanize the samples less the biases; position and velocity at the end of each, (n, 3), are the result."""
+    attitude, angular_rate, specific_force = starts.attitude, samples.angular_rate, samples.specific_force
+    boundaries, step, bias = samples.boundaries, samples.step, starts.bias
+    c, v, p = np.empty((3, 3)), np.empty(3), np.empty(3)
+    rate, force, unused = np.empty(3), np.empty(3), np.zeros(3)
+    for k in range(len(boundaries) - 1):
+        c[:, :], v[:], p[:] = attitude[k], starts.velocity[k], starts.position[k]
+        for i in range(boundaries[k], boundaries[k + 1]):
+            for a in range(3):
+                rate[a] = angular_rate[i, a] - bias[k, a]
+                force[a] = specific_force[i, a] - bias[k, 3 + a]
+            mechanize(c, v, p, rate, force, step[i], unused)
+            position[i] = p
+            velocity[i] = v
 
 
 def _states(

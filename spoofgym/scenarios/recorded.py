@@ -1,7 +1,7 @@
 """A recorded drive or flight as a game: real inertial samples and fixes, to which the spoofer adds its offset.
 
 The filter is aligned on the log, run over the clean fixes up to the onset, and goes on from there. A log is one
-realisation: nothing is drawn, and every episode is the same but for what the players do.
+realisation: nothing is drawn. Episodes differ only by what the players do.
 """
 
 from __future__ import annotations

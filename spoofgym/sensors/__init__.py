@@ -1,1 +1,1 @@
-"""What measures the motion: inertial units, receivers, odometers, satellites."""
+"""Sensors of the motion: inertial units, receivers, odometers, satellites."""

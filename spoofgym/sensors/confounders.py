@@ -1,4 +1,4 @@
-"""What makes a receiver look spoofed without a spoofer: outages and bursts of multipath."""
+"""Confounders: outages and bursts of multipath, which look like spoofing."""
 
 from __future__ import annotations
 

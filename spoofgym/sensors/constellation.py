@@ -1,4 +1,4 @@
-"""Where the satellites are: what a constellation offers, and the 24-slot constellation of GPS."""
+"""Positions of satellites: the interface of a constellation, and the 24-slot constellation of GPS."""
 
 from __future__ import annotations
 

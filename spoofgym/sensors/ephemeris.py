@@ -1,4 +1,4 @@
-"""Real satellites: the broadcast ephemeris of GPS and what it says of their orbits and clocks."""
+"""Orbits and clocks of real satellites by the broadcast ephemeris of GPS."""
 
 from __future__ import annotations
 

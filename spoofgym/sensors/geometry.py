@@ -1,4 +1,4 @@
-"""What a receiver sees of a constellation: who is in view, from where the signals come, and how well that fixes it."""
+"""The geometry of a receiver and a constellation: satellites in view, lines of sight, dilution of precision."""
 
 from __future__ import annotations
 

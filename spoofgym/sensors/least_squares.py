@@ -1,9 +1,9 @@
 """Position, velocity and clock of a receiver by weighted least squares of its ranges and range rates.
 
-A range is |satellite - receiver| + clock + error, with the satellite in the Earth-fixed frame of the moment of
-reception (`received_states`) and the receiver's clock as a range. An error is estimate minus truth. Where fewer than
-four satellites, or their geometry, give no fix, results are NaN and ``solved`` is False; nothing is raised for a single
-epoch.
+A range is |satellite - receiver| + clock + error. The satellite's position is in the Earth-fixed frame at the moment of
+reception (`received_states`), and the receiver's clock is a length. An error is estimate minus truth. If an epoch has
+fewer than four satellites, or their geometry gives no fix, its results are NaN and its ``solved`` is False; this raises
+no exception.
 """
 
 from __future__ import annotations

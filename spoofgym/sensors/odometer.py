@@ -1,6 +1,6 @@
 """A differential-drive odometer with the yaw of an INS: encoders, their errors, and dead reckoning (Song 2021).
 
-Yaw is clockwise from north, as Song's equations have it: east is the sine.
+Yaw is clockwise from north as in Song's equations, so the east component is the sine.
 """
 
 from __future__ import annotations
@@ -179,26 +179,6 @@ def encode(travel: Floats, odometer: Odometer) -> Floats:
     """Counts that each step adds, (J, 2): the encoder counts whole marks of the angle, so that nothing is lost."""
     marks = np.floor(np.cumsum(travel, axis=0) / odometer.travel_per_count)
     return np.diff(marks, axis=0, prepend=0.0)
-
-
-def encoder_track(travel: Floats, odometer: Odometer, yaw: float) -> tuple[Floats, Floats]:
-    """Dead reckoning by the encoders alone (Song 2021, eq 3).
-
-    The paper prints the whole yaw increment within sine and cosine: the mean direction of a step is its middle's, with
-    half of it.
-
-    Args:
-        travel: of the left and the right wheel in each step, (J, 2), m.
-        odometer: gives the base.
-        yaw: at the start, rad.
-
-    Returns:
-        Position from the start, (J+1, 2), east and north, m, and yaw, (J+1,), rad.
-    """
-    turned = (travel[:, 0] - travel[:, 1]) / odometer.wheel_base
-    heading = yaw + np.concatenate([[0.0], np.cumsum(turned)])
-    steps = step_displacement(travel, heading[:-1] + 0.5 * turned)
-    return np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heading
 
 
 def step_displacement(travel: Floats, yaw: Floats) -> Floats:

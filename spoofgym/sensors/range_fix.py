@@ -1,7 +1,8 @@
-"""What the errors of the ranges make of a weighted least-squares fix: its noise, for a filter that takes fixes.
+"""The noise of a weighted least-squares fix that the errors of the ranges cause, for a filter that takes fixes.
 
-The fix is linear in the errors of the ranges, p = (G' W G)⁻¹ G' W e (Liu 2018, section 5), so the slow ones are states
-of a coloured noise and the rest is white. The receiver's clock is estimated along with the position and drops out.
+The fix is linear in the errors of the ranges, p = (G' W G)⁻¹ G' W e (Liu 2018, section 5), so the slow errors
+become states of a coloured noise and the other errors become white noise. The receiver's clock is estimated together
+with the position and does not affect it.
 """
 
 from __future__ import annotations

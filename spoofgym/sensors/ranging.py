@@ -1,8 +1,8 @@
 """Ranges to satellites: pseudorange, carrier phase and range rate, and the budget of their errors.
 
 Every satellite has five errors of its own (satellite clock and ephemeris, ionosphere, code and carrier multipath, and
-the carrier's ambiguity); the zenith troposphere and the receiver's clock are common to all. The slow ones are
-first-order Gauss-Markov processes, what is left is white (Kujur 2024, appendix A).
+the carrier's ambiguity); the zenith troposphere and the receiver's clock are common to all. The slow errors
+are first-order Gauss-Markov processes, and the other errors are white (Kujur 2024, appendix A).
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ KUJUR = RangeErrors(
     ambiguity_sigma=100.0,
 )
 """Kujur 2024, appendix A. We read its 1.8 m of satellite clock and ephemeris as the stationary sigma (as driving noise
-of a process of 5 h it would make hundreds of metres). The ionosphere's sigma is `vertical_ionosphere_sigma` at the
+of a process of 5 h it would make hundreds of metres). The ionosphere's sigma is that of DO-229, J.2.3, at the
 start of the flight, geomagnetic latitude 53 degrees. The noise of the range rate and the prior of an ambiguity are
 ours: 5 cm/s is usual, and 100 m stands for knowing nothing: far above every error of the code, from which a receiver
 starts its ambiguity, yet small enough to leave a covariance its digits."""
@@ -152,28 +152,6 @@ def troposphere_mapping(elevation: Floats) -> Floats:
         elevation: of the satellite, rad, any shape.
     """
     return np.asarray(1.001 / np.sqrt(0.002001 + np.sin(elevation) ** 2))
-
-
-def geomagnetic_latitude(latitude: float, longitude: float) -> float:
-    """By the dipole of the Klobuchar model, rad (IS-GPS-200, 20.3.3.5.2.5).
-
-    Args:
-        latitude: geodetic, rad.
-        longitude: rad.
-    """
-    return latitude + 0.064 * math.pi * math.cos(longitude - 1.617 * math.pi)
-
-
-def vertical_ionosphere_sigma(magnetic_latitude: float) -> float:
-    """What the Klobuchar model leaves of the vertical delay, one sigma, m (DO-229, J.2.3).
-
-    Args:
-        magnetic_latitude: geomagnetic, rad.
-    """
-    degrees = abs(math.degrees(magnetic_latitude))
-    if degrees <= 20.0:
-        return 9.0
-    return 4.5 if degrees <= 55.0 else 6.0
 
 
 def code_variance(errors: RangeErrors, elevation: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""GNSS fixes: their rate, their noise, and where and when they are taken."""
+"""GNSS fixes: their rate, noise, lever arm and latency."""
 
 from __future__ import annotations
 

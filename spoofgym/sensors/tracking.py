@@ -1,4 +1,4 @@
-"""How well a spoofer knows where the vehicle is: the error of whatever sensor it tracks the vehicle with."""
+"""The error with which a spoofer tracks the vehicle."""
 
 from __future__ import annotations
 

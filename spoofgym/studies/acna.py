@@ -33,6 +33,8 @@ from spoofgym.detectors.acna import (
     gnss_drift,
 )
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.report import SCHEMA_VERSION
+from spoofgym.figures import new_figure
 from spoofgym.navigation.facts import ODOMETER
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.program import do_all, give_json, program
@@ -55,7 +57,6 @@ PUBLISHED = {
     "slow": (SONG_SLOW_EPOCHS, SONG_SLOW_THRESHOLD),
 }
 SYMBOLS = {"jump": ("n_j", "Th_j"), "slow": ("n_s", "Th_s")}
-PICTURES = (".png", ".svg", ".pdf")
 COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd")
 
 
@@ -206,13 +207,7 @@ def draw(grids: dict[str, Rates], path: Path) -> None:
     Raises:
         ImportError: matplotlib is missing.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
-    figure = Figure(figsize=(9.0, 5.6), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(9.0, 5.6, dpi=150, layout="constrained")
     axes = figure.subplots(2, 2, sharex="col", sharey="row")
     for column, (test, grid) in enumerate(grids.items()):
         symbol, level = SYMBOLS[test]
@@ -252,7 +247,7 @@ def _report(scenario: str, runs: int, seed: int, grids: dict[str, Rates]) -> dic
         window, level = PUBLISHED[test]
         found += rows(test, grid, play(scenario, test, np.array([window]), np.array([level]), runs, seed))
     return {
-        "schema_version": 1,
+        "schema_version": SCHEMA_VERSION,
         "kind": "acna-study",
         "scenario": scenario,
         "runs": runs,

@@ -20,12 +20,12 @@ from typing import Any
 
 from rich.console import Console, RenderableType
 
-from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.attackers import Evaluation
 from spoofgym.evaluation.defenders import POPULATIONS, evaluate_defenders
 from spoofgym.evaluation.matrix_games import ATTACKS, Matrix
@@ -160,7 +160,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
         options.threads,
         exact_threshold(scenario, detectors),
     )
-    attacks = [make_attack(text) for text in options.attack]
+    attacks = [make_spoofer(text) for text in options.attack]
     rows = evaluation.rows(policies, attacks, terminal)
     return attackers_report(scenario, fidelity, detectors, rows)
 
@@ -207,7 +207,7 @@ def _recorded(options: argparse.Namespace, scenario: Scenario, detectors: list[D
         raise ValueError("a recorded log is evaluated with --attack; --attacker needs a simulated scenario")
     if options.figure is not None:
         raise ValueError("--figure draws attackers in a simulated scenario; a recorded log gives a table and JSON")
-    attacks = [make_attack(text) for text in options.attack or ["ramp:0.5"]]
+    attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]
     return recorded_report(scenario, detectors, evaluate_recorded(scenario, attacks, detectors))
 
 

@@ -20,6 +20,7 @@ from spoofgym.calibration.thresholds import Calibration, measure_together
 from spoofgym.command_line import STDOUT, Parser, above_one, add_json, count, seed_number, threads
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector, require_threshold
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario
@@ -120,7 +121,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scenario = make_scenario(options.scenario)
     detectors = options.detector or NEEDING_SIMULATION
     table = rows(scenario, detectors, options.arl0, options.epochs, options.seed, options.threads)
-    report = {"schema_version": 1, "kind": "fidelity of thresholds", "scenario": scenario.name, "rows": table}
+    kind = "fidelity of thresholds"
+    report = {"schema_version": SCHEMA_VERSION, "kind": kind, "scenario": scenario.name, "rows": table}
     out = sys.stderr if options.json == STDOUT else sys.stdout
     do_all(lambda: print("\n".join(map(_line, table)), file=out), lambda: give_json(report, options.json))
     return 0

@@ -20,7 +20,8 @@ from spoofgym.attacks.profiles import EAST, heading
 from spoofgym.command_line import Parser, add_figure, count, seed_number
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import mean_interval
-from spoofgym.evaluation.monte_carlo import horizontal
+from spoofgym.figures import new_figure
+from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Clock
 from spoofgym.program import program
 from spoofgym.responses import make_response
@@ -144,13 +145,7 @@ def draw(courses: dict[str, Course], path: Path) -> None:
     Raises:
         ImportError: matplotlib is missing.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("the figure needs matplotlib: pip install 'spoofgym[report]'") from error
-    figure = Figure(figsize=(8.0, 4.4), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.0, 4.4, dpi=150, layout="constrained")
     axes = figure.add_subplot()
     time = next(iter(courses.values())).time
     offset = JUMP + RATE * np.maximum(time - PATIENCE, 0.0)

@@ -17,6 +17,7 @@ from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, above_one, add_json
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -88,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     scenario = make_scenario(options.scenario)
     rows = threshold_rows(scenario, options.detector or fitting(scenario), options.arl0)
-    report = {"schema_version": 1, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
+    report = {"schema_version": SCHEMA_VERSION, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
     out = sys.stderr if options.json == STDOUT else sys.stdout
     do_all(lambda: print("\n".join(map(_line, rows)), file=out), lambda: give_json(report, options.json))
     return 0

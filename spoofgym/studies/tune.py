@@ -21,6 +21,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.evaluation.defence import play_response
 from spoofgym.evaluation.defence_metrics import defender_score
 from spoofgym.evaluation.defenders import world_of
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.policies.classical import grid
 from spoofgym.program import do_all, give_json, program
 from spoofgym.responses import make_response
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             }
         )
     rows.sort(key=lambda row: float(row["mean_error_m"]))
-    report = {"schema_version": 1, "kind": "tuning", "scenario": scenario.name, "rows": rows}
+    report = {"schema_version": SCHEMA_VERSION, "kind": "tuning", "scenario": scenario.name, "rows": rows}
     table = tuning_table(report, options.episodes)
     do_all(lambda: show(terminal, table), lambda: give_json(report, options.json))
     return 0

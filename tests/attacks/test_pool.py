@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from spoofgym.attacks import ATTACKS, AttackPool, make_attack, opponents
+from spoofgym.attacks import ATTACKS, make_attack
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors import make_detector
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
@@ -184,7 +186,7 @@ def test_an_episode_is_a_reset_and_the_offset_at_each_clock(specification):
 
 def test_foi_scenarios_in_a_pool_follow_the_vehicle():
     scenario = make_scenario("foi-drive")
-    pool = opponents("foi-3", clean=0.5)
+    pool = spoofer_pool("foi-3", clean=0.5)
     simulation = Simulation(scenario, pool, num_runs=30, seed=1)
     simulation.reset()
     spoofed = pool.member == 0
@@ -231,7 +233,7 @@ def test_later_episodes_have_the_same_opponents_whatever_the_defender_drew():
 def test_objects_are_copied_so_that_two_games_do_not_share_them():
     """Members of two copies live in games of their own: four runs and one."""
     for given in (AttackPool([(make_attack("jump"), 1.0)], clean=0.0), [make_attack("jump")], make_attack("jump")):
-        first, second = (drawn(opponents(given, 0.0), number, seed) for number, seed in ((4, 0), (1, 9)))
+        first, second = (drawn(spoofer_pool(given, 0.0), number, seed) for number, seed in ((4, 0), (1, 9)))
         kept = first.offsets.copy()
         second.reset(np.arange(1), RunStreams.from_seed(10, 1))
         first.reset(np.array([3]), RunStreams.from_seed(0, 4))
@@ -240,21 +242,21 @@ def test_objects_are_copied_so_that_two_games_do_not_share_them():
 
 
 def test_opponents_are_made_of_names_objects_and_lists():
-    assert opponents("training", 0.1).name == "training:clean=0.1"
-    assert opponents("held-out:manoeuvre=0", 0.5).name == "held-out:manoeuvre=0"
-    assert opponents(["ramp:1", make_attack("jump")], 0.25).names == ("ramp:1", "jump")
+    assert spoofer_pool("training", 0.1).name == "training:clean=0.1"
+    assert spoofer_pool("held-out:manoeuvre=0", 0.5).name == "held-out:manoeuvre=0"
+    assert spoofer_pool(["ramp:1", make_attack("jump")], 0.25).names == ("ramp:1", "jump")
     pool = AttackPool([(make_attack("ramp:1"), 1.0)], clean=0.75)
-    copied = opponents(pool, 0.1)
+    copied = spoofer_pool(pool, 0.1)
     assert copied is not pool
     assert copied.clean == 0.75
     with pytest.raises(ValueError, match=r"the share of clean games is given by clean=0.5"):
-        opponents("training:clean=0.1", 0.5)
+        spoofer_pool("training:clean=0.1", 0.5)
 
 
 def test_the_share_of_clean_games_can_be_any_number():
-    assert opponents("training", np.float64(0.25)).name == "training:clean=0.25"
-    assert opponents("training", 0).clean == 0.0
-    assert opponents("training", 1.0 / 3.0).clean == 1.0 / 3.0
+    assert spoofer_pool("training", np.float64(0.25)).name == "training:clean=0.25"
+    assert spoofer_pool("training", 0).clean == 0.0
+    assert spoofer_pool("training", 1.0 / 3.0).clean == 1.0 / 3.0
 
 
 @pytest.mark.parametrize(
@@ -273,7 +275,7 @@ def test_the_share_of_clean_games_can_be_any_number():
 )
 def test_bad_opponents_are_refused(attacks, clean, message):
     with pytest.raises(ValueError, match=message):
-        opponents(attacks, clean)
+        spoofer_pool(attacks, clean)
 
 
 @pytest.mark.parametrize("name", ["training", "training:clean=0.1,manoeuvre=0", "held-out", "held-out:manoeuvre=0.3"])

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spoofgym.attacks import AttackPool, make_attack, opponents
+from spoofgym.attacks import make_attack
+from spoofgym.attacks.pool import AttackPool
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
@@ -115,7 +117,7 @@ def test_run_i_is_the_same_for_any_number_of_runs(flight):
     np.testing.assert_array_equal(play(flight, "position-only:random-ramp", 4)[0], whole[:, :4])
 
 
-@pytest.mark.parametrize("make", [make_attack, lambda text: opponents(text, 0.5)])
+@pytest.mark.parametrize("make", [make_attack, lambda text: spoofer_pool(text, 0.5)])
 def test_fixes_of_position_alone_refuse_it(make):
     with pytest.raises(ValueError, match=r"needs fixes with velocity \(m = 6\), scenario 'liu-flight' has fixes of"):
         Simulation(make_scenario("liu-flight"), make("position-only:ramp:1"))

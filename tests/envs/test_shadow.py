@@ -38,7 +38,7 @@ def test_means_are_those_of_the_model_that_the_spoofer_believes_in(shadow: str |
         offsets.append(env.game.seat.offset[0].copy())
     play = expected_play(make_scenario(shadow or SHORT).linear_model(), np.array(offsets), 25.9)
     np.testing.assert_allclose(whitened, play.whitened, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(env.game.seat.shadow.mean[0, 6:8], play.final_error, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(env.game.seat.shadow.position_error[0, :2], play.final_error, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("shadow", WRONG)

@@ -309,7 +309,7 @@ def test_shadow_follows_the_filter_exactly_in_expectation() -> None:
         assert (coming != change[0]).any()  # the offset was not held
     # the last fix is used in both
     np.testing.assert_allclose(
-        env.game.seat.shadow.mean[:, 6:9], env.game.simulation.error - clean.game.simulation.error, atol=1e-9
+        env.game.seat.shadow.position_error, env.game.simulation.error - clean.game.simulation.error, atol=1e-9
     )
 
 

@@ -125,7 +125,7 @@ def test_entries_of_the_spoofer_are_those_of_the_page(knowledge: str, place: int
     seen = env.step(np.array([0.0, 0.0, 0.0, 0.5]))[0]
     assert seen[3] == pytest.approx(1.0 / 11.0)
     if knowledge != "blind":
-        clock = env.game.seat.shadow.clock[0]
+        clock = env.game.seat.shadow.clock_error[0]
         assert seen[names.index("mean clock error")] == pytest.approx(clock / (10.0 + abs(clock)), rel=1e-6)
         assert clock > 0.3
 

@@ -12,8 +12,8 @@ from spoofgym.arrays import Floats
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.envs.tight_shadow import TightShadowFilter
 from spoofgym.navigation.interface import Decision, Demands, Spoof
+from spoofgym.navigation.tight.mean import TightMeanFilter
 from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.parallel import RunSlices
 from spoofgym.scenario import Scenario
@@ -81,14 +81,14 @@ def test_the_shadow_is_the_victim_without_noise(sky: Any, under: Under) -> None:
     assert sky in ((4.0, 5.0), "liu") or present.any(axis=0).sum() > present.all(axis=0).sum()
     played, victim = game(scenario, 1), SilentVictim(scenario)
     shadow = played.shadow
-    assert isinstance(shadow, TightShadowFilter)
+    assert isinstance(shadow, TightMeanFilter)
     victim.meet(np.zeros(4))
     for action in actions(40):
         played.step(action[None])
         victim.meet(played.offset[0])
-        np.testing.assert_allclose(shadow.mean[0], victim.navigator.state[0], rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(shadow.error[0], victim.navigator.state[0], rtol=1e-9, atol=1e-11)
         np.testing.assert_allclose(shadow.whitened[0], victim.whitened, rtol=1e-8, atol=1e-10)
-        assert shadow.clock[0] == pytest.approx(victim.navigator.clock_error[0], rel=1e-9)
+        assert shadow.clock_error[0] == pytest.approx(victim.navigator.clock_error[0], rel=1e-9)
         if played.index[0] < 40:
             np.testing.assert_allclose(shadow.coming[0], victim.would_meet(played.offset[0]), rtol=1e-8, atol=1e-10)
 
@@ -110,7 +110,7 @@ def test_the_shadow_is_the_mean_of_many_victims(sky: tuple[float, float], under:
     lanes = 2000
     played = game(under(*sky), lanes, fidelity="linear")
     shadow = played.shadow
-    assert isinstance(shadow, TightShadowFilter)
+    assert isinstance(shadow, TightMeanFilter)
     tolerance = 7.0 / np.sqrt(lanes)
     for k, action in enumerate(actions(40) + np.array([0.3, -0.2, 0.0, 0.2]), start=1):
         played.step(np.tile(action, (lanes, 1)))
@@ -119,10 +119,10 @@ def test_the_shadow_is_the_mean_of_many_victims(sky: tuple[float, float], under:
             deviation = whitened.mean(axis=0) - shadow.whitened[0]
             assert (np.abs(deviation) < tolerance * whitened.std(axis=0)).all()
     errors = played.simulation.error
-    deviation = errors.mean(axis=0) - shadow.mean[0, 6:9]
+    deviation = errors.mean(axis=0) - shadow.position_error[0]
     assert (np.abs(deviation) < tolerance * errors.std(axis=0)).all()
-    assert abs(played.clock_error.mean() - shadow.clock[0]) < tolerance * played.clock_error.std()
-    assert np.hypot(*shadow.mean[0, 6:8]) > 3.0 * tolerance * errors.std(axis=0).max()
+    assert abs(played.clock_error.mean() - shadow.clock_error[0]) < tolerance * played.clock_error.std()
+    assert np.hypot(*shadow.position_error[0, :2]) > 3.0 * tolerance * errors.std(axis=0).max()
 
 
 @pytest.mark.parametrize("scenario", [KUJUR, LIU])
@@ -134,7 +134,7 @@ def test_the_strapdown_victim_follows_the_shadow(scenario: str) -> None:
         spoofed.step(action[None])
         clean.step(np.zeros((1, 4)))
     moved = (spoofed.simulation.error - clean.simulation.error)[0]
-    expected = spoofed.shadow.mean[0, 6:9]
+    expected = spoofed.shadow.position_error[0]
     assert np.linalg.norm(moved - expected) < 0.01 * np.linalg.norm(expected) + 0.02
     assert np.linalg.norm(expected) > 1.0
 

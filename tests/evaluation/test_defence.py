@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spoofgym.attacks import opponents
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.evaluation import defence
 from spoofgym.evaluation.defence import (
     World,
@@ -78,7 +78,7 @@ def plain(world, use):
     """Errors of a plain simulation of the same games, (n, K), in which ``use`` decides on every fix."""
     simulation = Simulation(
         world.scenario,
-        opponents(world.attacks, world.clean),
+        spoofer_pool(world.attacks, world.clean),
         detectors_for(world.scenario),
         None,
         EPISODES,

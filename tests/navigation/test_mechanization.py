@@ -9,7 +9,6 @@ from spoofgym.geodesy import normal_gravity, position_difference
 from spoofgym.kernels import njit
 from spoofgym.mechanization import (
     attitude_matrix,
-    euler_angles,
     gravity_and_coriolis,
     invert_mechanization,
     mechanize,
@@ -17,6 +16,7 @@ from spoofgym.mechanization import (
     rotation_vector,
 )
 from spoofgym.scenarios.liu_flight import liu_trajectory
+from tests.attitudes import euler_angles
 
 DEGREES = np.array([np.pi / 180.0, np.pi / 180.0, 1.0])
 

@@ -13,7 +13,6 @@ from spoofgym.sensors.odometer import (
     PlanarMotion,
     draw_displacement,
     encode,
-    encoder_track,
     odometer_grade,
     step_displacement,
     wheel_travel,
@@ -24,6 +23,26 @@ FINE = Odometer(counts_per_turn=10**9)
 PERFECT = OdometerGrade(
     name="perfect", heading_offset=0.0, heading_drift=0.0, heading_random_walk=0.0, scale=0.0, slip=0.0, source="none"
 )
+
+
+def encoder_track(travel, odometer, yaw):
+    """Dead reckoning by the encoders alone (Song 2021, eq 3).
+
+    The paper prints the whole yaw increment within sine and cosine: the mean direction of a step is its middle's, with
+    half of it.
+
+    Args:
+        travel: of the left and the right wheel in each step, (J, 2), m.
+        odometer: gives the base.
+        yaw: at the start, rad.
+
+    Returns:
+        Position from the start, (J+1, 2), east and north, m, and yaw, (J+1,), rad.
+    """
+    turned = (travel[:, 0] - travel[:, 1]) / odometer.wheel_base
+    heading = yaw + np.concatenate([[0.0], np.cumsum(turned)])
+    steps = step_displacement(travel, heading[:-1] + 0.5 * turned)
+    return np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heading
 
 
 def circle(turn_rate):

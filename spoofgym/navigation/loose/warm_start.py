@@ -39,7 +39,7 @@ class WarmStart:
     Attributes:
         filter_covariance: the filter's P, (15, 15).
         joint_covariance: of y, (30 + C, 30 + C).
-        joint_factor: a square root of it, likewise.
+        joint_factor: a square root of it, of the same shape.
     """
 
     filter_covariance: Floats

@@ -10,9 +10,12 @@ from spoofgym.arrays import Flags, Floats
 from spoofgym.immutable import Immutable
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES
 from spoofgym.navigation.interface import Innovation, Spoof
+from spoofgym.navigation.mean import MeanFilter
+from spoofgym.navigation.tight.mean import TightMeanFilter
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tight.states import num_states
 from spoofgym.navigation.white import WhiteInnovations
+from spoofgym.parallel import RunSlices
 
 
 class RangeFamily(Immutable, ABC):
@@ -46,6 +49,10 @@ class RangeFamily(Immutable, ABC):
         """What clean innovations at epochs 0..K are made of, where the filter is matched."""
         model = self.tight_model()
         return WhiteInnovations(model.innovation_factor, model.position_response, np.tile(model.dynamics.present, 2))
+
+    def mean_filter(self, num_runs: int, slices: RunSlices) -> MeanFilter:
+        """The filter of ``num_runs`` games run in expectation, every range used."""
+        return TightMeanFilter(self.tight_model(), num_runs, slices)
 
     def blank_innovation(self, num_runs: int) -> Innovation:
         """An innovation of zeros and of no satellites, before there is any."""

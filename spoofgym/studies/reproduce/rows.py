@@ -22,12 +22,12 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.evaluation.metrics import NORMAL_95
+from spoofgym.evaluation.report import SCHEMA_VERSION
 
 Verdict = Literal["reproduced", "partly", "not reproduced"]
 Reasons = dict[Verdict, str]
 Value = float | str
 NEVER = "never"
-SCHEMA_VERSION = 1
 
 INSIDE = "The published value meets the range of our runs."
 NEAR = "Outside the range of our runs, but within a factor of two of their median."

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats
+from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Decision
 from spoofgym.navigation.loose.own_gains import OwnCovarianceNavigator
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
@@ -47,7 +48,7 @@ class Tracks:
     @property
     def horizontal_error(self) -> Floats:
         """Length of the horizontal error, (N, K+1), m."""
-        return np.hypot(self.error[:, :, 0], self.error[:, :, 1])
+        return horizontal(self.error)
 
     def at(self, time: float) -> int:
         """The epoch at a scenario time.

@@ -1,0 +1,91 @@
+"""What the pictures of both games have in common: lane 0 is recorded epoch by epoch and drawn into one figure."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from gymnasium.error import DependencyNotInstalled
+from numpy.typing import NDArray
+
+from spoofgym.figures import new_figure
+from spoofgym.simulation import Simulation
+
+STATISTICS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Colours of the statistics."""
+ALARM, SAFE = "#c1121f", "#2b7a3d"
+"""Colours of what is bad and what is good."""
+LARGEST_LINEAR = 5.0
+"""Statistics over their thresholds are drawn on a logarithmic scale where one exceeds this."""
+
+
+class GameFigure(ABC):
+    """Records lane 0 of a game and draws it.
+
+    Raises:
+        DependencyNotInstalled: matplotlib is missing.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Prepare to record a simulation."""
+        try:
+            self._figure = new_figure(9.6, 5.4, dpi=100)
+        except ImportError as error:
+            raise DependencyNotInstalled("rendering needs matplotlib: pip install 'spoofgym[render]'") from error
+        self._simulation = simulation
+        self._names = list(simulation.detectors)
+        self._rows: list[tuple[float, ...]] = []
+
+    def restart(self) -> None:
+        """Forget the last game and record epoch 0 of the new one."""
+        self._rows = []
+        self.record()
+
+    @abstractmethod
+    def record(self) -> None:
+        """Keep the present epoch."""
+
+    def draw(self) -> NDArray[np.uint8]:
+        """The figure so far, (540, 960, 3)."""
+        self._figure.clear()
+        self._draw(np.array(self._rows))
+        self._figure.canvas.draw()
+        return np.asarray(self._figure.canvas.buffer_rgba())[:, :, :3].copy()
+
+    @abstractmethod
+    def _draw(self, rows: NDArray[np.float64]) -> None:
+        """Draw all panels; rows are what was recorded, an epoch each."""
+
+    def close(self) -> None:
+        """Free what was drawn."""
+        self._figure.clear()
+
+    def _ratios(self) -> list[float]:
+        """Each statistic of lane 0 over its threshold."""
+        simulation = self._simulation
+        return [float(simulation.epoch.statistics[n][0] / d.threshold) for n, d in simulation.detectors.items()]
+
+    def _headline(self, text: str, **options: Any) -> None:
+        """Write a line above all panels."""
+        self._figure.suptitle(text, fontsize=13, fontweight="bold", y=0.975, **options)
+
+
+def scale_ratios(axes: Any, ratios: NDArray[np.float64], headroom: float, label: str | None = None) -> None:
+    """Choose the scale of a panel of statistics over their thresholds, and mark the zone of alarms.
+
+    Args:
+        axes: of the panel.
+        ratios: all that are drawn.
+        headroom: factor of the largest one at which a logarithmic scale ends.
+        label: of the line at the threshold.
+    """
+    largest = float(ratios.max(initial=0.0))
+    if largest > LARGEST_LINEAR:
+        axes.set_yscale("log")
+        low, high = 0.01, headroom * largest
+    else:
+        low, high = 0.0, 1.45 * max(largest, 1.0)
+    axes.axhspan(1.0, high, color=ALARM, alpha=0.08, linewidth=0)
+    axes.axhline(1.0, color=ALARM, linestyle="--", linewidth=1, label=label)
+    axes.set(ylabel="statistic / threshold", ylim=(low, high))
