@@ -20,8 +20,11 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     # the width of the terminal in which the tests run, which workers inherit, is not the width that a test means
     os.environ.pop("COLUMNS", None)
-    # a worker of xdist inherits the folders of the process that started it
+    # a worker of xdist inherits the folders of the process that started it, and these limits
     if not hasattr(config, "workerinput"):
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            # a worker for each core: more threads of one would only wait, busily, for those of the other
+            os.environ.setdefault(name, "1")
         folder = _in_the_test_cache(config) or _temporary(config)
         # thresholds that tests calibrate, never among the user's
         os.environ["SPOOFGYM_CACHE"] = str(folder)

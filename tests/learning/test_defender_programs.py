@@ -21,7 +21,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.envs.trained import defender_config
 from spoofgym.evaluation import defenders
 from spoofgym.evaluation.defence import World, play_policy, play_response
-from spoofgym.learning import defender
+from spoofgym.learning import defender, defender_ppo, imitation
 from spoofgym.learning.defender import VALIDATION_FILE, VALIDATION_SEED
 from spoofgym.learning.run_folder import CHECKPOINT_FILE
 from spoofgym.policies import classical as listed
@@ -79,6 +79,16 @@ DEFENDERS = {
     "tuned-depth": "tuned",
     "tuned-onset": "tuned",
 }
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few_lessons():
+    """Imitation goes through all of its steps, in few games: no test here asks what is learned in it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(defender_ppo, "TEACHING_LANES", 8)
+        for name, value in (("FEW", 1), ("MANY", 2), ("PASSES", 5)):
+            patch.setattr(imitation, name, value)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +207,8 @@ def test_equal_seeds_train_equal_policies(run, tmp_path):
 @pytest.mark.slow
 def test_interruption_leaves_a_usable_policy(tmp_path, child):
     folder = tmp_path / "interrupted"
-    command = [sys.executable, "-m", "spoofgym.learning.defender", *SHORT, "--steps", "100000000", "--out", str(folder)]
+    begun = ["--imitate", "false", "--steps", "100000000", "--out", str(folder)]  # what interrupts imitation is above
+    command = [sys.executable, "-m", "spoofgym.learning.defender", *SHORT, *begun]
     process = child(command, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 600
     while not (folder / CHECKPOINT_FILE).exists() and process.poll() is None and time.monotonic() < deadline:

@@ -55,6 +55,7 @@ def test_self_tuning_filter_is_blind_in_white_noise_at_a_matched_rate():
     assert stats.binomtest(only_common, only_common + only_tuned, 0.5, alternative="greater").pvalue < 1e-3
 
 
+@pytest.mark.slow
 def test_rows_have_every_setup_and_figures_of_the_paper():
     report = shadmehri_2025.reproduce(3, 0, quick=True)
     assert report.paper == "shadmehri-2025"

@@ -11,6 +11,7 @@ from spoofgym.envs.observation import spoofer_fields
 from spoofgym.evaluation.trained_on import what_is_new
 from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
+from spoofgym.sensors.imu import GRADES
 from spoofgym.studies import evaluate, wrong_shadow
 
 SCENARIO = "liu-flight:horizon=12"
@@ -56,7 +57,11 @@ def test_what_is_new_is_told_once(folder, options, words, capsys):
     assert note.endswith(words)
 
 
-def test_a_wrong_shadow_is_new_by_design_but_another_victim_is_not(folder, capsys):
+def test_a_wrong_shadow_is_new_by_design_but_another_victim_is_not(folder, capsys, monkeypatch):
+    # each shadow takes an optimum of its own
+    monkeypatch.setattr(wrong_shadow, "SIGMA_FACTORS", (2.0,))
+    grades = {name: GRADES[name] for name in ("tactical", "navigation")}
+    monkeypatch.setattr(wrong_shadow, "GRADES", grades)
     assert wrong_shadow.main(["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "4"]) == 0
     assert notes(capsys.readouterr().err) == []
     other = ["--scenario", "liu-flight:horizon=13", "--attacker", str(folder), "--episodes", "4", "--json", "-"]
