@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
@@ -18,13 +17,14 @@ from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.metrics import attacker_score, undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import attacker_row
-from spoofgym.evaluation.trained_on import tell_what_is_new
 from spoofgym.optimum import expected_play
 from spoofgym.policies.baselines import Baseline, known_baselines, searched_baselines
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
 
 
 @dataclass(frozen=True)
@@ -51,21 +51,24 @@ class Evaluation:
     threads: int
     threshold: float | None
 
-    def rows(self, policies: list[LearnedSpoofer], attacks: list[Attack], console: Console) -> list[dict[str, Any]]:
-        """Rows of the baselines, of scripted attacks and of policies, in this order."""
-        self.check_layouts(policies)
-        self.check_attacks(attacks)
-        with console.status("baselines"):
+    def rows(
+        self, policies: list[LearnedSpoofer], attacks: list[Attack], progress: Progress = silent
+    ) -> list[dict[str, Any]]:
+        """Rows of the baselines, of scripted attacks and of policies, in this order.
+
+        Check attacks and policies before: `check_attacks`, `check_layouts`.
+        """
+        with progress("baselines"):
             baselines = self._baselines()
         optimum = next((baseline.exact for baseline in baselines if baseline.name == "optimum"), None)
         rows = []
         for baseline in baselines:
-            rows.append(self._row(baseline, optimum, console))
+            rows.append(self._row(baseline, optimum, progress))
         for attack in attacks:
             knowledge = attack.knowledge if isinstance(attack, PolicySpoofer) else "blind"
-            rows.append(self._row(Baseline(attack.name, knowledge, attack, None), optimum, console))
+            rows.append(self._row(Baseline(attack.name, knowledge, attack, None), optimum, progress))
         for policy in policies:
-            with console.status(policy.name):
+            with progress(policy.name):
                 score = attacker_score(self.play_policy(policy))
                 exact = self.exact(policy)
             rows.append(attacker_row(policy.name, spoofer_config(policy).knowledge, score, exact, optimum))
@@ -81,7 +84,7 @@ class Evaluation:
             Simulation(self.scenario, deepcopy(attack), self.detectors, fidelity=self.fidelity)
 
     def check_layouts(self, policies: list[LearnedSpoofer]) -> None:
-        """Refuse policies that were trained for another observation, and tell which play something else.
+        """Refuse policies that were trained for another observation.
 
         Raises:
             ValueError: naming the policy and the first entry that differs, or what cannot be built of its game.
@@ -92,17 +95,16 @@ class Evaluation:
             except ValueError as error:
                 raise ValueError(f"policy {policy.name!r}: {error}") from error
             policy.check_layout([field.name for field in fields])
-        tell_what_is_new(policies, self.scenario, self.fidelity, self.detectors)
 
     def _baselines(self) -> list[Baseline]:
         if self.threshold is not None:
             return known_baselines(self.scenario, self.threshold)
         return searched_baselines(self.scenario, self._mean_score)
 
-    def _row(self, baseline: Baseline, optimum: float | None, console: Console) -> dict[str, Any]:
+    def _row(self, baseline: Baseline, optimum: float | None, progress: Progress) -> dict[str, Any]:
         score = None
         if baseline.attack is not None:
-            with console.status(baseline.name):
+            with progress(baseline.name):
                 score = attacker_score(self.play(baseline.attack, self.episodes))
         return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
 
@@ -122,7 +124,7 @@ class Evaluation:
             threads=self.threads,
         )
 
-    def _game(self, policy: LearnedSpoofer, lanes: int) -> SpooferGame:
+    def _game(self, policy: LearnedSpoofer, lanes: int, streams: RunStreams | None = None) -> SpooferGame:
         """The evaluated game as this policy sees it: its own knowledge, action, memory and shadow filter."""
         config = replace(
             spoofer_config(policy),
@@ -131,13 +133,13 @@ class Evaluation:
             fidelity=self.fidelity,
             threads=self.threads,
         )
-        return SpooferGame(config, lanes)
+        return SpooferGame(config, lanes, streams=streams)
 
     def play_policy(self, policy: LearnedSpoofer) -> Episodes:
         """Games of a policy."""
 
-        def make(lanes: int) -> SpooferGame:
-            return self._game(policy, lanes)
+        def make(streams: RunStreams) -> SpooferGame:
+            return self._game(policy, len(streams), streams)
 
         return play_policy(make, policy.act, self.episodes, self.seed)
 

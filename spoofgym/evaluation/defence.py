@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.pool import AttackPool
@@ -16,8 +15,7 @@ from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.envs.opponents import spoofer_pool
-from spoofgym.evaluation.monte_carlo import batches
-from spoofgym.geodesy import horizontal
+from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, play
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
 from spoofgym.responses.watching import Watching
@@ -86,20 +84,20 @@ class World:
     threads: int = 1
 
     def simulation(
-        self, response: Response | None, episodes: int, seed: int, demands: Demands
+        self, response: Response | None, streams: RunStreams, demands: Demands
     ) -> Simulation:
-        """A simulation of some episodes, the first of which is seeded ``seed``."""
+        """A simulation with these random streams, a run each."""
         return Simulation(
             self.scenario,
             spoofer_pool(self.attacks, self.clean),
             list(self.detectors),
             response,
-            episodes,
-            seed,
+            len(streams),
             fidelity=self.fidelity,
             threads=self.threads,
             demands=demands,
             confounders=Confounders(self.disturbances),
+            streams=streams,
         )
 
 
@@ -185,25 +183,16 @@ def _play(
     episodes: int,
     seed: int,
 ) -> DefenceEpisodes:
-    parts = []
-    for first, count in batches(episodes, seed, BATCH):
-        simulation = world.simulation(response, count, first, demands)
-        simulation.reset()
-        record = _Record(simulation)
-        for k in range(world.scenario.timeline.num_epochs):
-            if k:
-                simulation.observe()
-            record.see(simulation, k)
-            record.excluded[:, k] = decide(simulation)
-            record.error[:, k] = horizontal(simulation.error)
-        parts.append(record.episodes(simulation))
-    return _join(parts)
+    def make(streams: RunStreams) -> SimulationBatch:
+        return SimulationBatch(world.simulation(response, streams, demands), decide)
+
+    return _join(play(make, _Record, episodes, seed, BATCH))
 
 
 def play_policy(
     world: World,
     config: DefenderConfig,
-    act: Callable[[NDArray[np.float32]], NDArray[np.int64]],
+    act: Act,
     episodes: int,
     seed: int,
 ) -> DefenceEpisodes:
@@ -224,54 +213,63 @@ def play_policy(
         fidelity=world.fidelity,
         threads=world.threads,
     )
-    parts = []
-    for first, count in batches(episodes, seed, BATCH):
-        game = DefenderGame(config, count, world.detectors)
-        game.confounders.disturbances = world.disturbances
-        game.simulation.streams = RunStreams.from_seed(first, count)
-        game.reset(np.arange(count))
-        record = _Record(game.simulation)
-        for k in range(world.scenario.timeline.num_epochs):
-            record.see(game.simulation, k)
-            actions = act(game.observation())
-            record.excluded[:, k] = actions[:, 0] == EXCLUDE
-            game.step(actions)
-            game.simulation.require_converged()
-            record.error[:, k] = game.error
-        parts.append(record.episodes(game.simulation))
-    return _join(parts)
+
+    def make(streams: RunStreams) -> _PolicyBatch:
+        game = DefenderGame(
+            config, len(streams), world.detectors, streams=streams, disturbances=world.disturbances
+        )
+        return _PolicyBatch(game, act)
+
+    return _join(play(make, _Record, episodes, seed, BATCH))
+
+
+class _PolicyBatch(GameBatch):
+    """Games of a policy that defends."""
+
+    @property
+    def excluded(self) -> Flags:
+        """Whether the last action was to exclude, (N,)."""
+        return np.equal(self.actions[:, 0], EXCLUDE)
 
 
 class _Record:
     """What is noted of a batch of games while it is played."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        shape = (simulation.num_runs, simulation.scenario.timeline.num_epochs)
-        self.error = np.zeros(shape)
-        self.excluded, self.available, self.attacked, self.multipath = (np.zeros(shape, dtype=bool) for _ in range(4))
+    def __init__(self, batch: SimulationBatch | _PolicyBatch) -> None:
+        self._batch, self._simulation = batch, batch.simulation
+        shape = (batch.simulation.num_runs, batch.simulation.scenario.timeline.num_epochs)
+        self._error = np.zeros(shape)
+        self._excluded, self._available, self._attacked, self._multipath = (
+            np.zeros(shape, dtype=bool) for _ in range(4)
+        )
 
-    def see(self, simulation: Simulation, k: int) -> None:
+    def before(self, epoch: int) -> None:
         """Note the present epoch before it is decided on."""
+        simulation = self._simulation
         assert simulation.epoch.available is not None
         assert simulation.confounders is not None
-        self.available[:, k] = simulation.epoch.available
-        self.attacked[:, k] = simulation.attacked
-        self.multipath[:, k] = simulation.confounders.multipath[:, k]
+        self._available[:, epoch] = simulation.epoch.available
+        self._attacked[:, epoch] = simulation.attacked
+        self._multipath[:, epoch] = simulation.confounders.multipath[:, epoch]
 
-    def episodes(self, simulation: Simulation) -> DefenceEpisodes:
+    def after(self, epoch: int) -> None:
+        """Note the decision and the error that it left."""
+        self._excluded[:, epoch] = self._batch.excluded
+        self._error[:, epoch] = self._batch.error
+
+    def result(self) -> DefenceEpisodes:
         """All games of the batch."""
-        attack = simulation.attack
+        attack = self._simulation.attack
         assert isinstance(attack, AttackPool)
-        clean = self.available & ~self.attacked & ~self.multipath
         return DefenceEpisodes(
-            self.error,
-            self.excluded,
-            self.available,
-            self.attacked,
-            clean,
+            self._error,
+            self._excluded,
+            self._available,
+            self._attacked,
+            self._available & ~self._attacked & ~self._multipath,
             attack.member.copy(),
             tuple(attack.names),
-            simulation.scenario.timeline,
+            self._simulation.scenario.timeline,
         )
 
 

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
@@ -26,8 +25,8 @@ from spoofgym.evaluation.defence import (
     play_response,
 )
 from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, difference, paired_difference
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import defenders_report
-from spoofgym.evaluation.trained_on import tell_what_is_new
 from spoofgym.policies.classical import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
 from spoofgym.policies.learned import LearnedDefender
 from spoofgym.responses import make_response
@@ -45,14 +44,25 @@ def fits(detector: str, scenario: Scenario) -> bool:
     return set(make_detector(detector).needs) <= set(scenario.offers)
 
 
-def listed_for(scenario: Scenario, listed: Sequence[ClassicalDefender], console: Console) -> list[ClassicalDefender]:
-    """Those of the defenders that are always played whose detectors fit the scenario; the console names the others."""
-    left_out = [item for item in listed if not fits(item.detector, scenario)]
-    if left_out:
-        names = ", ".join(f"{item.name} ({item.detector})" for item in left_out)
-        text = f"left out, as scenario {scenario.name} does not give what they need: {names}"
-        console.print(text, markup=False, soft_wrap=True)
-    return [item for item in listed if item not in left_out]
+def listed_for(scenario: Scenario) -> dict[str, list[ClassicalDefender]]:
+    """The defenders that are always played in a scenario, by their kind: those whose detectors fit."""
+    return {
+        kind: [item for item in listed if fits(item.detector, scenario)] for kind, listed in _listed(scenario).items()
+    }
+
+
+def left_out(scenario: Scenario) -> list[str]:
+    """A line for each kind of which some defenders are not played, since their detectors do not fit the scenario."""
+    lines = []
+    for listed in _listed(scenario).values():
+        names = [f"{item.name} ({item.detector})" for item in listed if not fits(item.detector, scenario)]
+        if names:
+            lines.append(f"left out, as scenario {scenario.name} does not give what they need: {', '.join(names)}")
+    return lines
+
+
+def _listed(scenario: Scenario) -> dict[str, Sequence[ClassicalDefender]]:
+    return {"published": PUBLISHED, "tuned": tuned_for(scenario.name)}
 
 
 def world_of(
@@ -82,6 +92,17 @@ def _watched(policy: LearnedDefender) -> tuple[str | Detector, ...]:
     """The detectors whose statistics a policy sees."""
     detectors = defender_config(policy).detectors
     return detectors if isinstance(detectors, tuple) else (detectors,)
+
+
+def check_names(policies: Sequence[LearnedDefender]) -> None:
+    """Refuse policies that a report could not tell apart.
+
+    Raises:
+        ValueError: two policies of one name.
+    """
+    names = [policy.name for policy in policies]
+    if len(set(names)) < len(names):
+        raise ValueError(f"run folders of one name cannot be told apart: {', '.join(names)}")
 
 
 def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
@@ -118,9 +139,9 @@ class Played:
 class Defenders:
     """Plays every defender in a world."""
 
-    def __init__(self, world: World, episodes: int, seed: int, console: Console) -> None:
+    def __init__(self, world: World, episodes: int, seed: int, progress: Progress = silent) -> None:
         """Play ``episodes`` games each, the first of which is seeded ``seed``."""
-        self._world, self._episodes, self._seed, self._console = world, episodes, seed, console
+        self._world, self._episodes, self._seed, self._progress = world, episodes, seed, progress
 
     def play(
         self,
@@ -150,7 +171,7 @@ class Defenders:
             yield self._played(policy.name, "learned", games)
 
     def _played(self, name: str, kind: str, games: Callable[[], DefenceEpisodes]) -> Played:
-        with self._console.status(f"{self._world.attacks}: {name}"):
+        with self._progress(f"{self._world.attacks}: {name}"):
             return Played(name, kind, games())
 
     def _classical(self, defender: ClassicalDefender) -> DefenceEpisodes:
@@ -248,7 +269,7 @@ def evaluate_defenders(
     episodes: int,
     seed: int,
     threads: int,
-    console: Console,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """The ``"defenders"`` report: every defender against every population.
 
@@ -261,26 +282,23 @@ def evaluate_defenders(
         episodes: games per population and defender.
         seed: of game 0.
         threads: of the simulation.
-        console: where the progress is shown.
+        progress: shows what is played.
 
     Raises:
         ValueError: two policies of one name, one that was trained on another observation, or one or a given defender
             whose detector does not fit the scenario.
     """
-    names = [policy.name for policy in policies]
-    if len(set(names)) < len(names):
-        raise ValueError(f"run folders of one name cannot be told apart: {', '.join(names)}")
-    tell_what_is_new(policies, scenario, fidelity)
-    published = listed_for(scenario, PUBLISHED, console)
-    tuned = listed_for(scenario, tuned_for(scenario.name), console)
+    check_names(policies)
+    listed = listed_for(scenario)
     kinds: dict[str, str] = {}
     report_rows, pairs, gaps = [], [], []
     for population in populations:
         held_out = POPULATIONS[population]
-        with console.status("thresholds of the detectors"):
+        with progress("thresholds of the detectors"):
             world = world_of(scenario, population, fidelity, threads, policies, given)
         check_policies(world, policies)
-        played = list(Defenders(world, episodes, seed, console).play(published, tuned, given, policies))
+        games = Defenders(world, episodes, seed, progress)
+        played = list(games.play(listed["published"], listed["tuned"], given, policies))
         learned = [item for item in played if item.kind == "learned"]
         for item in played:
             kinds[item.name] = item.kind

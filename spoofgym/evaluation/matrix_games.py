@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rich.console import Console
-
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
@@ -18,10 +16,11 @@ from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
 from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack, watch_policy
-from spoofgym.evaluation.trained_on import tell_what_is_new
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.optimal import ORACLES, oracles
 from spoofgym.scenario import Scenario
+from spoofgym.streams import RunStreams
 
 DETECTORS = (
     "snapshot",
@@ -93,7 +92,7 @@ class Matrix:
         detectors: Sequence[str],
         attacks: Sequence[str],
         policies: Sequence[LearnedSpoofer],
-        console: Console,
+        progress: Progress = silent,
     ) -> dict[str, Any]:
         """The whole ``"matrix"`` report.
 
@@ -101,11 +100,29 @@ class Matrix:
             detectors: specifications; none = `DETECTORS`.
             attacks: specifications, or names of `ORACLES`; none = `ATTACKS` and all oracles.
             policies: learned spoofers.
-            console: for the progress.
+            progress: shows what is played.
 
         Raises:
             ValueError: a part that is unknown or does not fit the scenario, or a policy that sees its detector's
                 statistics.
+        """
+        self.check_knowledge(policies)
+        with progress("attacks"):
+            scripted = self._attacks(attacks)
+        with progress("thresholds"):
+            ready = self._detectors(detectors or DETECTORS)
+        clean = self._play(make_attack(CLEAN), ready, progress)
+        rows, curves = matrix_rows(ready, CLEAN, clean), []
+        for name, games in self._games(scripted, policies, ready, progress):
+            rows += matrix_rows(ready, name, games)
+            curves += detection_curves(ready, clean, name, games)
+        return matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
+
+    def check_knowledge(self, policies: Sequence[LearnedSpoofer]) -> None:
+        """Refuse policies that see the statistics of a detector.
+
+        Raises:
+            ValueError: naming the policy.
         """
         for policy in policies:
             if spoofer_config(policy).knowledge == "full":
@@ -113,17 +130,6 @@ class Matrix:
                     f"policy {policy.name!r} sees the statistics of its own detector (knowledge 'full'): the matrix "
                     "takes policies that know less, 'blind' or 'shadow'"
                 )
-        tell_what_is_new(policies, self.scenario, self.fidelity)
-        with console.status("attacks"):
-            scripted = self._attacks(attacks)
-        with console.status("thresholds"):
-            ready = self._detectors(detectors or DETECTORS)
-        clean = self._play(make_attack(CLEAN), ready, console)
-        rows, curves = matrix_rows(ready, CLEAN, clean), []
-        for name, games in self._games(scripted, policies, ready, console):
-            rows += matrix_rows(ready, name, games)
-            curves += detection_curves(ready, clean, name, games)
-        return matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
 
     def names(self, attacks: Sequence[str], policies: Sequence[LearnedSpoofer]) -> list[str]:
         """Of the attacks that `report` plays with these arguments, the clean games left out."""
@@ -154,16 +160,16 @@ class Matrix:
         attacks: Sequence[Attack],
         policies: Sequence[LearnedSpoofer],
         detectors: list[Detector],
-        console: Console,
+        progress: Progress,
     ) -> list[tuple[str, WatchedEpisodes]]:
-        games = [(attack.name, self._play(attack, detectors, console)) for attack in attacks]
+        games = [(attack.name, self._play(attack, detectors, progress)) for attack in attacks]
         for policy in policies:
-            with console.status(policy.name):
+            with progress(policy.name):
                 games.append((policy.name, self._play_policy(policy, detectors)))
         return games
 
-    def _play(self, attack: Attack, detectors: list[Detector], console: Console) -> WatchedEpisodes:
-        with console.status(attack.name):
+    def _play(self, attack: Attack, detectors: list[Detector], progress: Progress) -> WatchedEpisodes:
+        with progress(attack.name):
             return watch_attack(
                 self.scenario,
                 attack,
@@ -175,7 +181,7 @@ class Matrix:
             )
 
     def _play_policy(self, policy: LearnedSpoofer, detectors: list[Detector]) -> WatchedEpisodes:
-        def make(lanes: int) -> SpooferGame:
+        def make(streams: RunStreams) -> SpooferGame:
             config = replace(
                 spoofer_config(policy),
                 scenario=self.scenario,
@@ -183,7 +189,7 @@ class Matrix:
                 fidelity=self.fidelity,
                 threads=self.threads,
             )
-            game = SpooferGame(config, lanes)
+            game = SpooferGame(config, len(streams), streams=streams)
             policy.check_layout([field.name for field in game.fields])
             return game
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym import validation
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.base import Attack
-from spoofgym.detectors.base import Detector
+from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, play
 from spoofgym.geodesy import horizontal
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -85,71 +85,56 @@ class WatchedEpisodes:
         return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
 
 
-def batches(episodes: int, seed: int, size: int) -> Iterator[tuple[int, int]]:
-    """Seed of the first game and number of games of each batch.
-
-    Args:
-        episodes: games of all batches.
-        seed: of the first game of all.
-        size: games of a batch.
-
-    Raises:
-        ValueError: no games, or too many, or a seed that is no whole number, 0 or more.
-    """
-    episodes = validation.runs("evaluation", "episodes", episodes)
-    seed = validation.whole("evaluation", "seed", seed, 0, 2**62)
-    for first in range(0, episodes, size):
-        yield seed + first, min(size, episodes - first)
-
-
 class _Watch:
-    """First alarms, the errors then, and the highest statistic over its threshold, of each detector and run, (D, n)."""
+    """First alarms, the errors then, and the highest statistic over its threshold, of each detector and run, (D, n).
 
-    def __init__(self, detectors: int, runs: int) -> None:
-        self.alarm_epoch = np.full((detectors, runs), NEVER)
-        self.alarm_error = np.zeros((detectors, runs))
-        self.peak = np.full((detectors, runs), -np.inf)
-
-    def forget(self, runs: Flags) -> None:
-        """Begin anew with runs, (n,)."""
-        self.alarm_epoch[:, runs] = NEVER
-        self.peak[:, runs] = -np.inf
-
-    def see(self, place: int, epoch: int, ratio: Floats, error: Floats) -> None:
-        """Take one detector's epoch: its statistic over its threshold, and the errors, (n,)."""
-        np.maximum(self.peak[place], ratio, out=self.peak[place])
-        fresh = (ratio > 1.0) & (self.alarm_epoch[place] == NEVER)
-        self.alarm_epoch[place, fresh] = epoch
-        self.alarm_error[place, fresh] = error[fresh]
-
-
-def _play(simulation: Simulation, advance: Callable[[], object]) -> tuple[_Watch, Runs]:
-    """Play to the last epoch; ``advance`` resolves the present epoch and observes the next.
-
-    Returns:
-        What was seen, from the attack on where there is one, and the last epoch before it, (n,).
+    Where an attack begins, what was seen before is forgotten.
     """
-    detectors, n = simulation.detectors, simulation.num_runs
-    watch = _Watch(len(detectors), n)
-    begun, onset_epoch = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64)
-    for epoch in range(1, simulation.scenario.timeline.num_epochs + 1):
-        advance()
-        simulation.require_converged()
-        begins = ~begun & simulation.attacked
+
+    def __init__(self, batch: SimulationBatch | GameBatch) -> None:
+        self._batch, self._simulation = batch, batch.simulation
+        self._thresholds = {name: require_threshold(part) for name, part in self._simulation.detectors.items()}
+        detectors, runs = len(self._thresholds), self._simulation.num_runs
+        self._alarm_epoch = np.full((detectors, runs), NEVER)
+        self._alarm_error = np.zeros((detectors, runs))
+        self._peak = np.full((detectors, runs), -np.inf)
+        self._begun, self._onset_epoch = np.zeros(runs, dtype=bool), np.zeros(runs, dtype=np.int64)
+
+    def before(self, epoch: int) -> None:
+        """Note nothing: an epoch is seen when it is observed."""
+
+    def after(self, epoch: int) -> None:
+        """See the epoch that comes after ``epoch``: it has been observed."""
+        simulation = self._simulation
+        begins = ~self._begun & simulation.attacked
         if begins.any():
-            onset_epoch[begins] = epoch - 1
-            begun |= begins
-            watch.forget(begins)
+            self._onset_epoch[begins] = epoch
+            self._begun |= begins
+            self._alarm_epoch[:, begins] = NEVER
+            self._peak[:, begins] = -np.inf
         error = horizontal(simulation.error)
-        for place, (name, detector) in enumerate(detectors.items()):
-            assert detector.threshold is not None
-            watch.see(place, epoch, simulation.epoch.statistics[name] / detector.threshold, error)
-    return watch, onset_epoch
+        for place, (name, threshold) in enumerate(self._thresholds.items()):
+            self._see(place, epoch + 1, simulation.epoch.statistics[name] / threshold, error)
 
+    def _see(self, place: int, epoch: int, ratio: Floats, error: Floats) -> None:
+        """Take one detector's epoch: its statistic over its threshold, and the errors, (n,)."""
+        np.maximum(self._peak[place], ratio, out=self._peak[place])
+        fresh = (ratio > 1.0) & (self._alarm_epoch[place] == NEVER)
+        self._alarm_epoch[place, fresh] = epoch
+        self._alarm_error[place, fresh] = error[fresh]
 
-def _watched(simulation: Simulation, watch: _Watch, onset_epoch: Runs, final_error: Floats) -> WatchedEpisodes:
-    timeline = simulation.scenario.timeline
-    return WatchedEpisodes(watch.alarm_epoch, watch.alarm_error, watch.peak, final_error, onset_epoch, timeline)
+    def result(self) -> WatchedEpisodes:
+        """All games of the batch, whose last fix is used, too."""
+        if isinstance(self._batch, SimulationBatch):  # a game of a spoofer has resolved it itself
+            self._batch.resolve()
+        return WatchedEpisodes(
+            self._alarm_epoch,
+            self._alarm_error,
+            self._peak,
+            self._batch.error.copy(),
+            self._onset_epoch,
+            self._simulation.scenario.timeline,
+        )
 
 
 def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
@@ -178,21 +163,21 @@ def watch_attack(
     Raises:
         ValueError: no episodes, or what `Simulation` refuses.
     """
-    parts = []
-    for first, count in batches(episodes, seed, BATCH):
+
+    def make(streams: RunStreams) -> SimulationBatch:
         simulation = Simulation(
-            scenario, attack, detectors, None, count, first, fidelity=fidelity, threads=threads
+            scenario,
+            attack,
+            detectors,
+            None,
+            len(streams),
+            fidelity=fidelity,
+            threads=threads,
+            streams=streams,
         )
-        simulation.reset()
+        return SimulationBatch(simulation)
 
-        def advance(simulation: Simulation = simulation) -> None:
-            simulation.resolve()
-            simulation.observe()
-
-        watch, onset_epoch = _play(simulation, advance)
-        simulation.resolve()
-        parts.append(_watched(simulation, watch, onset_epoch, horizontal(simulation.error)))
-    return _join(parts)
+    return _join(play(make, _Watch, episodes, seed, BATCH))
 
 
 def play_attack(
@@ -212,36 +197,25 @@ def play_attack(
 
 
 def watch_policy(
-    make_game: Callable[[int], SpooferGame],
-    act: Callable[[NDArray[np.float32]], NDArray[np.float32]],
+    make_game: Callable[[RunStreams], SpooferGame],
+    act: Act,
     episodes: int,
     seed: int,
 ) -> WatchedEpisodes:
     """Games of a policy; game i is seeded ``seed + i``, whatever the policy, and meets the noise that an attack would.
 
     Args:
-        make_game: builds a game of that many lanes.
+        make_game: builds a game with these random streams, a lane each.
         act: actions for observations (N, D), (N, 3).
         episodes: how many games.
         seed: of game 0.
     """
-    parts = []
-    for first, count in batches(episodes, seed, BATCH):
-        game = make_game(count)
-        game.simulation.streams = RunStreams.from_seed(first, count)
-        game.reset(np.arange(count))
-
-        def advance(game: SpooferGame = game) -> None:
-            game.step(act(game.observation()))
-
-        watch, onset_epoch = _play(game.simulation, advance)
-        parts.append(_watched(game.simulation, watch, onset_epoch, game.error.copy()))
-    return _join(parts)
+    return _join(play(lambda streams: GameBatch(make_game(streams), act), _Watch, episodes, seed, BATCH))
 
 
 def play_policy(
-    make_game: Callable[[int], SpooferGame],
-    act: Callable[[NDArray[np.float32]], NDArray[np.float32]],
+    make_game: Callable[[RunStreams], SpooferGame],
+    act: Act,
     episodes: int,
     seed: int,
 ) -> Episodes:

@@ -1,8 +1,8 @@
 """Loosely and tightly coupled filters side by side on a drive whose log has raw ranges, clean and pulled north.
 
-``python -m spoofgym.evaluation.recorded_ranges PATH`` prints two tables: the filters on the clean drive, and games in
-which all ranges (or the fixes made from them) are pulled as one position. A game begins every minute; run i of a
-simulation is the game with onset i, so that one pass over the drive plays them all.
+There are two kinds of rows: the filters on the clean drive, and games in which all ranges (or the fixes made from them)
+are pulled as one position. A game begins every minute; run i of a simulation is the game with onset i, so that one pass
+over the drive plays them all.
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats
-from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import Fixes, interpolate, read_log
 from spoofgym.logs.range_epochs import RangeEpochs
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import moved
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.recorded import recorded
 from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
@@ -291,60 +290,5 @@ def side_by_side(path: str) -> dict[str, Any]:
     }
 
 
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
-
-
-def tables(report: dict[str, Any]) -> list[str]:
-    """The lines of both tables, and the clock's."""
-    lines = [
-        "| filter, clean | epochs | median, m | 95 %, m | common epochs | median, m | 95 %, m | NIS per degree "
-        "| false alarms per hour |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    for row in report["clean"]:
-        alarms = ", ".join(f"{name} {entry['per_hour']:.0f}" for name, entry in row["false_alarms"].items())
-        lines.append(
-            f"| {row['filter']} | {row['compared']} | {_number(row['median_m'], 2)} | {_number(row['p95_m'], 1)} "
-            f"| {row['common']} | {_number(row['common_median_m'], 2)} | {_number(row['common_p95_m'], 1)} "
-            f"| {row['nis_per_degree']:.2f} | {alarms} |"
-        )
-    lines += [
-        "",
-        "| filter, pulled | m/s north | median, m | 95 %, m | NIS per degree | detector | any alarm "
-        "| alarm owed to the pull | after, s | pulled by then, m |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for row in report["pulled"]:
-        owed = row["owed"]
-        lines.append(
-            f"| {row['filter']} | {row['rate_mps']:g} | {_number(row['median_m'], 1)} | {_number(row['p95_m'], 1)} "
-            f"| {row['nis_per_degree']:.2f} | {row['detector']} | {row['any']['games']} of {row['games']} "
-            f"| {owed['games']} of {row['games']} | {_number(owed['median_s'], 0)} "
-            f"| {_number(owed['median_pull_m'], 0)} |"
-        )
-    clock = report["clock"]
-    lines += [
-        "",
-        f"drift of the receiver's clock: {clock['by_pseudoranges_mps']:.1f} m/s by pseudoranges, "
-        f"{clock['by_range_rates_mps']:.1f} m/s by range rates (medians); at most "
-        f"{clock['largest_difference_mps']:.0f} m/s apart",
-    ]
-    return lines
-
-
-@program
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Filters side by side on a drive with raw ranges, clean and pulled."""
-    parser = Parser(prog="python -m spoofgym.evaluation.recorded_ranges", description=main.__doc__)
-    parser.add_argument("path", metavar="PATH", help="folder of a log with ranges.csv and ephemeris.csv")
-    add_json(parser)
-    options = parser.parse_args(arguments)
-    report = side_by_side(options.path)
-    out = sys.stderr if options.json == STDOUT else sys.stdout
-    do_all(lambda: print("\n".join(tables(report)), file=out), lambda: give_json(report, options.json))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym.studies.recorded_ranges"))

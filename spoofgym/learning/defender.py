@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -25,17 +24,17 @@ from stable_baselines3 import PPO
 from spoofgym import files
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import Parser
-from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.learning import checkpoint
 from spoofgym.learning.defender_ppo import Settings, begin, export, make_learner
-from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options, given_options
+from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
+from spoofgym.learning.session import train
 from spoofgym.learning.watch import CHECKPOINTS, Watch, mean_return
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
-from spoofgym.program import INTERRUPTED, program
+from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 
 DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
@@ -83,18 +82,8 @@ def asked_run(given: dict[str, Any]) -> Run:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    given = given_options(options)
     folder = RunFolder(options.out, "spoofgym.learning.defender", DefenderConfig, Settings)
-    if options.resume:
-        run = folder.resumed(given)
-    else:
-        folder.refuse_overwriting()
-        run = asked_run(given)
-    torch.set_num_threads(run.environment.threads)
-    training = Training(run, folder, console(stderr=True))
-    if not options.resume:
-        folder.begin(run)
-    return training.run()
+    return train(options, folder, asked_run, Training)
 
 
 Rows = list[dict[str, float]]
@@ -123,11 +112,11 @@ class Training:
             self._read(state)
         self._watch = Watch(run.steps, terminal, lambda present: f"mean return {mean_return(present):.1f}", self._keep)
 
-    def run(self) -> int:
-        """Train to the end; returns the exit status."""
+    def train(self) -> bool:
+        """Train to the end; whether Ctrl-C came before it."""
         if self._best is not None:
             self._write()  # a kill may have come between these files and the checkpoint
-        started, before, interrupted = time.perf_counter(), self._learner.num_timesteps, False
+        interrupted = False
         try:
             if not self._begun:
                 self._begin()
@@ -143,14 +132,12 @@ class Training:
         path = self._folder.path
         if interrupted and not (path / POLICY_FILE).is_file():
             export(self._learner, self._config, path).save(path)
-        played, seconds = max(0, self._learner.num_timesteps - before), time.perf_counter() - started
-        self._console.print(
-            f"{'interrupted after' if interrupted else 'trained'} {played:,} steps in {seconds:.0f} s, validation "
-            f"included ({played / max(seconds, 1e-9):,.0f} steps/s); {self._best_row()}; policy in {path}"
-            + (f"; go on with: {self._folder.command}" if interrupted else ""),
-            soft_wrap=True,
-        )
-        return INTERRUPTED if interrupted else 0
+        return interrupted
+
+    @property
+    def played(self) -> int:
+        """Steps played."""
+        return self._learner.num_timesteps
 
     def _begin(self) -> None:
         """Begin with a classical defender, or with nothing."""
@@ -225,7 +212,8 @@ class Training:
             checkpoint.restore(self._learner, state["learner"])
             self._begun = True
 
-    def _best_row(self) -> str:
+    def summary(self) -> str:
+        """Which policy was kept, and how it did in validation."""
         if not self._validation:
             return "no validation yet"
         best = min(self._validation, key=lambda row: row["mean_error_m"])

@@ -11,26 +11,24 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
 from rich.console import Console
 from stable_baselines3 import PPO
 
 from spoofgym import files
 from spoofgym.command_line import Parser, count
-from spoofgym.console import console
 from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig, configure
 from spoofgym.learning import checkpoint
 from spoofgym.learning.ppo import Settings, export, make_learner
-from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options, given_options
+from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
+from spoofgym.learning.session import train
 from spoofgym.learning.watch import Watch, mean_return
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.program import INTERRUPTED, program
+from spoofgym.program import program
 
 
 def parser() -> argparse.ArgumentParser:
@@ -63,18 +61,8 @@ def asked_run(given: dict[str, Any]) -> Run:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    given = given_options(options)
     folder = RunFolder(options.out, "spoofgym.learning.spoofer", SpooferConfig, Settings)
-    if options.resume:
-        run = folder.resumed(given)
-    else:
-        folder.refuse_overwriting()
-        run = asked_run(given)
-    torch.set_num_threads(run.environment.threads)
-    training = Training(run, folder, console(stderr=True))
-    if not options.resume:
-        folder.begin(run)
-    return training.run()
+    return train(options, folder, asked_run, Training)
 
 
 @dataclass(frozen=True)
@@ -105,7 +93,7 @@ class Training:
         Raises:
             ValueError: the environment cannot be built, or the checkpoint is damaged.
         """
-        self._run, self._folder, self._console = run, folder, terminal
+        self._run, self._folder = run, folder
         self._trials = run.learner.trials
         self._place = Place()
         with folder.naming_settings():
@@ -119,9 +107,9 @@ class Training:
             run.steps, terminal, lambda present: f"mean gain {mean_return(present) * scale:.1f} m", self._keep
         )
 
-    def run(self) -> int:
-        """Train to the end; returns the exit status."""
-        started, before, interrupted = time.perf_counter(), self._played, False
+    def train(self) -> bool:
+        """Train to the end; whether Ctrl-C came before it."""
+        interrupted = False
         self._watch.start()
         try:
             while self._place.trial < self._trials:
@@ -135,17 +123,15 @@ class Training:
             self._watch.stop()
         if interrupted and self._shown:
             self._save_policy(self._learner)
-        played, seconds = self._played - before, time.perf_counter() - started
-        self._console.print(
-            f"{'interrupted after' if interrupted else 'trained'} {played:,} steps in {seconds:.0f} s "
-            f"({played / max(seconds, 1e-9):,.0f} steps/s); policy in {self._folder.path}"
-            + (f"; go on with: {self._folder.command}" if interrupted else ""),
-            soft_wrap=True,
-        )
-        return INTERRUPTED if interrupted else 0
+        return interrupted
+
+    def summary(self) -> str:
+        """Nothing: no validation chose the policy."""
+        return ""
 
     @property
-    def _played(self) -> int:
+    def played(self) -> int:
+        """Steps played, of all learners together."""
         return self._place.before + self._learner.num_timesteps
 
     @property

@@ -189,7 +189,11 @@ class FilterBatch(ABC):
         """
         runs = self._select(runs)
         self._deviation[runs] = deviation
-        return self._form(runs, self._unweighted.of(slice(len(runs))))
+        return self._form(runs, self._plain(len(runs)))
+
+    def _plain(self, n: int) -> Weights:
+        """The weights of n runs whose measurements are used as they are."""
+        return self._unweighted if n == len(self._all) else self._unweighted.of(slice(n))
 
     def _form(self, runs: Runs, weights: Weights) -> Innovation:
         innovation = self._innovate(runs, weights)
@@ -200,17 +204,21 @@ class FilterBatch(ABC):
         """Take fixes back, then apply the present one, or reset to it, where the decision says so; else coast.
 
         Raises:
-            ValueError: a backtrack without a history.
+            ValueError: a backtrack without a history, or what shared gains cannot follow.
         """
         runs = self._select(runs)
         before = self._solution(runs) if self.auxiliary.shape[1] else None
-        self._form_anew(decision, runs, self._take_back(decision, runs))
-        fixed = runs[self._reset_where_decided(decision, runs)]
+        fixed = self._decide(decision, runs)
         self._correct(fixed)
         self._corrected(fixed)
         self._settle(runs)
         if before is not None:  # the unaided solution stays where it is while the filter's has moved
             self.auxiliary[runs] += self._moved(before, self._solution(runs))
+
+    def _decide(self, decision: Decision, runs: Runs) -> Runs:
+        """Take back, form anew and reset as decided; which runs use their fix otherwise, (k,)."""
+        self._form_anew(decision, runs, self._take_back(decision, runs))
+        return runs[self._reset_where_decided(decision, runs)]
 
     def _take_back(self, decision: Decision, runs: Runs) -> Flags:
         """Go back where it is decided, as far as history and episode reach; which runs have, (n,)."""
@@ -239,7 +247,7 @@ class FilterBatch(ABC):
             again = again | ~decision.satellites.all(axis=1)
         places = np.flatnonzero(again & decision.use)
         if len(places):
-            plain = self._unweighted.of(slice(len(runs)))
+            plain = self._plain(len(runs))
             scale = plain.noise_scale if decision.noise_scale is None else decision.noise_scale
             satellites = plain.satellites if decision.satellites is None else decision.satellites
             self._form(runs[places], Weights(scale, satellites).of(places))
@@ -282,8 +290,8 @@ class FilterBatch(ABC):
 class SharedGains(FilterBatch):
     """N runs whose gains are those of the model: every run uses every measurement."""
 
-    def resolve(self, decision: Decision, runs: Runs | None = None) -> None:
-        """Apply the measurement of runs (all by default).
+    def _decide(self, decision: Decision, runs: Runs) -> Runs:
+        """All runs use their measurement.
 
         Raises:
             ValueError: a measurement is left out or weighted, which shared gains cannot follow.
@@ -291,10 +299,10 @@ class SharedGains(FilterBatch):
         others = (decision.backtrack, decision.reset, decision.noise_scale, decision.satellites)
         if not decision.use.all() or any(part is not None for part in others):
             raise ValueError("a fix is left out, but the gains are shared: the navigator needs a covariance per run")
-        super().resolve(decision, runs)
+        return runs
 
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
-        raise NotImplementedError("`resolve` refuses a reset")
+        raise NotImplementedError("a reset is refused")
 
     def _past_error(self, epochs: Runs) -> Floats:
         return np.zeros((*epochs.shape, 3))  # there is no history, so that these are no epochs

@@ -1,15 +1,16 @@
 """The equations of the error-state Kalman filter, one run at a time.
 
-Every function works in place on one run's arrays, so that a navigator's loop over runs allocates nothing. The
-measurement touches the nine navigation states only (H is (m, 9)), the six bias states are random constants or walks: Φ
-= [[Φn, Φb], [0, I]] with rows (9, 15) stored.
+Every function works in place on one run's arrays, so that a navigator's loop over runs allocates nothing. The number of
+states n follows from the arrays. The first nine are attitude, velocity and position; the others (six biases, and what a
+family adds) are random constants or walks: Φ = [[Φn, Φb], [0, I]], of whose first nine rows the first w columns are
+stored, n or fewer; the rest are zero. A measurement observes the first h states: H is (m, h), 9 or more.
 
 The update is written in whitened form: with S = L L', U = P H' L⁻ᵀ and w = L⁻¹ z,
 
     K z = U w,        P⁺ = P - U U',        NIS = w' w,
 
 which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. U is stored by columns, as
-U' (m, 15), so that every inner loop runs along a row. Source: Bar-Shalom, Li and Kirubarajan 2001, ch. 5, rearranged.
+U' (m, n), so that every inner loop runs along a row. Source: Bar-Shalom, Li and Kirubarajan 2001, ch. 5, rearranged.
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ from spoofgym.arrays import Floats
 from spoofgym.kernels import njit
 
 N = 9
-FULL = 15
+"""Attitude, velocity and position."""
+USUAL = 15
+"""States of most filters. The two functions that take most of the time are compiled with this as a constant, too: their
+inner loops are then a quarter to a third faster, with the same bits."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -28,20 +32,20 @@ def predict_error(columns: Floats, noise: Floats, error: Floats, work: Floats) -
     """x <- Φ x + w.
 
     Args:
-        columns: the first nine rows of Φ, stored by columns so that the inner loop is a vector operation, (15, 9).
-        noise: w, (15,).
-        error: x, (15,), in place.
+        columns: the first nine rows of Φ, stored by columns so that the inner loop is a vector operation, (w, 9).
+        noise: w, (n,).
+        error: x, (n,), in place.
         work: (9,).
     """
     for i in range(N):
         work[i] = noise[i]
-    for j in range(FULL):
+    for j in range(columns.shape[0]):
         factor = error[j]
         for i in range(N):
             work[i] += columns[j, i] * factor
     for i in range(N):
         error[i] = work[i]
-    for i in range(N, FULL):
+    for i in range(N, error.shape[0]):
         error[i] += noise[i]
 
 
@@ -50,13 +54,13 @@ def predict_mean(transition: Floats, error: Floats, work: Floats) -> None:
     """x <- Φ x, for a Φ stored by rows.
 
     Args:
-        transition: first nine rows of Φ, (9, 15).
-        error: x, (15,), in place.
+        transition: first nine rows of Φ, (9, w).
+        error: x, (w,) at least, in place.
         work: (9,).
     """
     for i in range(N):
         work[i] = 0.0
-        for j in range(FULL):
+        for j in range(transition.shape[1]):
             work[i] += transition[i, j] * error[j]
     for i in range(N):
         error[i] = work[i]
@@ -67,30 +71,41 @@ def predict_covariance(transition: Floats, process_noise: Floats, covariance: Fl
     """P <- Φ P Φ' + Q.
 
     Args:
-        transition: first nine rows of Φ, (9, 15).
-        process_noise: Q, (15, 15).
-        covariance: P, (15, 15), in place.
-        work: (9, 15).
+        transition: first nine rows of Φ, (9, w).
+        process_noise: Q, (n, n).
+        covariance: P, (n, n), in place.
+        work: (9, n).
     """
+    n, width = covariance.shape[0], transition.shape[1]
+    if n == USUAL and width == USUAL:
+        _predict_covariance(USUAL, USUAL, transition, process_noise, covariance, work)
+    else:
+        _predict_covariance(n, width, transition, process_noise, covariance, work)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _predict_covariance(
+    n: int, width: int, transition: Floats, process_noise: Floats, covariance: Floats, work: Floats
+) -> None:
     for i in range(N):
-        for j in range(FULL):
+        for j in range(n):
             work[i, j] = 0.0
-        for k in range(FULL):
+        for k in range(width):
             factor = transition[i, k]
-            for j in range(FULL):
+            for j in range(n):
                 work[i, j] += factor * covariance[k, j]
     for i in range(N):
         for j in range(i + 1):
             total = process_noise[i, j]
-            for k in range(FULL):
+            for k in range(width):
                 total += work[i, k] * transition[j, k]
             covariance[i, j] = total
             covariance[j, i] = total
-        for j in range(N, FULL):
+        for j in range(N, n):
             covariance[i, j] = work[i, j] + process_noise[i, j]
             covariance[j, i] = covariance[i, j]
-    for i in range(N, FULL):
-        for j in range(N, FULL):
+    for i in range(N, n):
+        for j in range(N, n):
             covariance[i, j] += process_noise[i, j]
 
 
@@ -101,25 +116,25 @@ def innovation_covariance(
     """HP and S = H P H' + R.
 
     Args:
-        covariance: P, (15, 15).
-        observation: H, (m, 9); mostly zeros, which cost nothing.
+        covariance: P, (n, n).
+        observation: H, (m, h); mostly zeros, which cost nothing.
         noise_covariance: R, (m, m).
-        cross: HP, (m, 15), overwritten.
+        cross: HP, (m, n), overwritten.
         innovation: S, (m, m), overwritten.
     """
-    m = observation.shape[0]
+    m, observed = observation.shape
     for a in range(m):
-        for j in range(FULL):
+        for j in range(cross.shape[1]):
             cross[a, j] = 0.0
-        for k in range(N):
+        for k in range(observed):
             factor = observation[a, k]
             if factor != 0.0:
-                for j in range(FULL):
+                for j in range(cross.shape[1]):
                     cross[a, j] += factor * covariance[k, j]
     for a in range(m):
         for b in range(m):
             total = noise_covariance[a, b]
-            for k in range(N):
+            for k in range(observed):
                 total += observation[a, k] * cross[b, k]
             innovation[a, b] = total
 
@@ -135,8 +150,8 @@ def scale_noise(scale: float, noise_covariance: Floats, innovation: Floats) -> N
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def forget_correlations(state: int, variance: float, covariance: Floats) -> None:
-    """One state gets a new variance and is correlated with no other; covariance (15, 15) in place."""
-    for i in range(FULL):
+    """One state gets a new variance and is correlated with no other; covariance (n, n) in place."""
+    for i in range(covariance.shape[0]):
         covariance[state, i] = 0.0
         covariance[i, state] = 0.0
     covariance[state, state] = variance
@@ -163,19 +178,19 @@ def whitened_gain(cross: Floats, factor: Floats, gain: Floats) -> None:
     """U' = L⁻¹ H P.
 
     Args:
-        cross: HP, (m, 15).
+        cross: HP, (m, n).
         factor: L, (m, m).
-        gain: U', (m, 15), overwritten.
+        gain: U', (m, n), overwritten.
     """
     for a in range(factor.shape[0]):
-        for i in range(FULL):
+        for i in range(gain.shape[1]):
             gain[a, i] = cross[a, i]
         for b in range(a):
             share = factor[a, b]
-            for i in range(FULL):
+            for i in range(gain.shape[1]):
                 gain[a, i] -= share * gain[b, i]
         scale = 1.0 / factor[a, a]
-        for i in range(FULL):
+        for i in range(gain.shape[1]):
             gain[a, i] *= scale
 
 
@@ -200,14 +215,23 @@ def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def update_covariance(gain: Floats, covariance: Floats) -> None:
-    """P <- P - U U'; gain U' (m, 15), covariance (15, 15) in place.
+    """P <- P - U U'; gain U' (m, n), covariance (n, n) in place.
 
     Whole rows are faster than the lower triangle alone; it is mirrored, since the last bits of both halves may differ.
     """
-    for i in range(FULL):
+    n = covariance.shape[0]
+    if n == USUAL:
+        _update_covariance(USUAL, gain, covariance)
+    else:
+        _update_covariance(n, gain, covariance)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _update_covariance(n: int, gain: Floats, covariance: Floats) -> None:
+    for i in range(n):
         for a in range(gain.shape[0]):
             factor = gain[a, i]
-            for j in range(FULL):
+            for j in range(n):
                 covariance[i, j] -= factor * gain[a, j]
         for j in range(i):
             covariance[j, i] = covariance[i, j]
@@ -215,8 +239,8 @@ def update_covariance(gain: Floats, covariance: Floats) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def correct_error(gain: Floats, whitened: Floats, error: Floats) -> None:
-    """x <- x - K z = x - U w; gain U' (m, 15), whitened w (m,), error x (15,) in place."""
+    """x <- x - K z = x - U w; gain U' (m, n), whitened w (m,), error x (n,) in place."""
     for a in range(gain.shape[0]):
         factor = whitened[a]
-        for i in range(FULL):
+        for i in range(gain.shape[1]):
             error[i] -= gain[a, i] * factor

@@ -50,28 +50,12 @@ class LinearSteps(NamedTuple):
         transition: Φ, (K+1, n, n).
         process_noise: the filter's Q, (K+1, n, n).
         noise_columns: the factor of the true noise, stored by columns, (K+1, 9, 9).
-        observation: H on the nine navigation states, (K+1, m, 9).
     """
 
     transition_columns: Floats
     transition: Floats
     process_noise: Floats
     noise_columns: Floats
-    observation: Floats
-
-
-class LinearGains(NamedTuple):
-    """The arrays of a `LinearModel` that kernels form innovations with where gains are shared.
-
-    Attributes:
-        observation: H on the nine navigation states, (K+1, m, 9).
-        innovation_factor: lower L with S = L L', (K+1, m, m).
-        whitened_gain: U' = L⁻¹ H P, (K+1, m, n).
-    """
-
-    observation: Floats
-    innovation_factor: Floats
-    whitened_gain: Floats
 
 
 @dataclass(frozen=True)
@@ -122,14 +106,7 @@ class LinearModel(Immutable):
     @cached_property
     def steps(self) -> LinearSteps:
         """What kernels carry runs with."""
-        return LinearSteps(
-            self.transition_columns, self.transition, self.process_noise, self.noise_columns, self.observation
-        )
-
-    @cached_property
-    def gains(self) -> LinearGains:
-        """What kernels form innovations with where gains are shared."""
-        return LinearGains(self.observation, self.innovation_factor, self.whitened_gain)
+        return LinearSteps(self.transition_columns, self.transition, self.process_noise, self.noise_columns)
 
     @property
     def num_states(self) -> int:

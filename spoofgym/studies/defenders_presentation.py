@@ -5,15 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from spoofgym import files
 from spoofgym.evaluation.defenders import LEARNED_MEAN
+from spoofgym.figures import new_figure
 from spoofgym.studies.presentation import number, plain
 
 COLOURS = {
@@ -145,8 +143,7 @@ def defenders_figure(report: dict[str, Any], path: Path) -> None:
     pooled = [row for row in report["rows"] if _is_pooled(row)]
     held_out = any(row["held_out"] for row in pooled)
     rows = sorted((row for row in pooled if row["held_out"] == held_out), key=lambda row: -row["mean_error_m"])
-    figure = Figure(figsize=(8.6, 0.3 * len(rows) + 1.8), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.6, 0.3 * len(rows) + 1.8, dpi=120, layout="constrained")
     axes = figure.add_subplot()
     places = {kind: [i for i, row in enumerate(rows) if report["kinds"][row["defender"]] == kind] for kind in LABELS}
     for kind, of_kind in places.items():
@@ -161,6 +158,8 @@ def defenders_figure(report: dict[str, Any], path: Path) -> None:
         axes.annotate(
             label, (row["ci95_m"][1], place), (7, 0), textcoords="offset points", va="center", fontsize=8
         )
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
     axes.set_xscale("log")
     # few games can have an interval that reaches below zero, which a logarithmic axis lacks
     lowest = min(max(row["ci95_m"][0], 0.3 * row["mean_error_m"]) for row in rows)

@@ -27,7 +27,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.attackers import Evaluation
-from spoofgym.evaluation.defenders import POPULATIONS, evaluate_defenders
+from spoofgym.evaluation.defenders import POPULATIONS, check_names, evaluate_defenders, left_out
 from spoofgym.evaluation.matrix_games import ATTACKS, Matrix
 from spoofgym.evaluation.recorded import evaluate_recorded
 from spoofgym.evaluation.report import attackers_report, recorded_report
@@ -41,6 +41,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded_family import RecordedFamily
 from spoofgym.studies.defenders_presentation import defenders_figure, defenders_tables
 from spoofgym.studies.matrix_presentation import curves_figure, matrix_figure, matrix_tables
+from spoofgym.studies.notes import tell_what_is_new
 from spoofgym.studies.presentation import attackers_figure, attackers_table, recorded_table
 
 EPISODES = {"linear": 20_000, "strapdown": 1_000}
@@ -161,7 +162,10 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
         exact_threshold(scenario, detectors),
     )
     attacks = [make_spoofer(text) for text in options.attack]
-    rows = evaluation.rows(policies, attacks, terminal)
+    evaluation.check_layouts(policies)
+    evaluation.check_attacks(attacks)
+    tell_what_is_new(policies, scenario, fidelity, detectors)
+    rows = evaluation.rows(policies, attacks, terminal.status)
     return attackers_report(scenario, fidelity, detectors, rows)
 
 
@@ -181,7 +185,9 @@ def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, term
     )
     if options.roc is not None:
         _roc_attack(options.roc_attack, matrix.names(options.attack, policies))
-    return matrix.report(options.detector or (), options.attack, policies, terminal)
+    matrix.check_knowledge(policies)
+    tell_what_is_new(policies, scenario, fidelity)
+    return matrix.report(options.detector or (), options.attack, policies, terminal.status)
 
 
 def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, terminal: Console) -> dict[str, Any]:
@@ -197,8 +203,12 @@ def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, t
             raise ValueError(f"--defender {text!r} is neither a run folder nor 'detector > response'")
     populations = options.population or tuple(POPULATIONS)
     episodes = options.episodes or DEFENDER_EPISODES
+    check_names(policies)
+    tell_what_is_new(policies, scenario, fidelity)
+    for line in left_out(scenario):
+        terminal.print(line, markup=False, soft_wrap=True)
     return evaluate_defenders(
-        scenario, fidelity, policies, given, populations, episodes, options.seed, options.threads, terminal
+        scenario, fidelity, policies, given, populations, episodes, options.seed, options.threads, terminal.status
     )
 
 

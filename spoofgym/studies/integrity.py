@@ -23,13 +23,13 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
-from spoofgym.evaluation.stanford import draw_side_by_side
 from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 from spoofgym.specification import spell
+from spoofgym.studies.stanford import draw_side_by_side
 
 HORIZON = 2400
 """Epochs of half a second: 20 minutes."""

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -17,7 +13,11 @@ from scipy import stats
 
 from spoofgym import files
 from spoofgym.arrays import Floats
+from spoofgym.figures import new_figure
 from spoofgym.studies.presentation import plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ENSEMBLE = "ensemble"
 COLUMNS = 12
@@ -113,8 +113,7 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
     detectors, attacks, detected = values(report, "detection_probability")
     _, _, error = values(report, "mean_undetected_error_m")
     width, height = 1.9 + CELL[0] * len(attacks), 2.4 + CELL[1] * len(detectors)
-    figure = Figure(figsize=(width, 2 * height), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, 2 * height, dpi=150, layout="constrained")
     above, below = figure.subplots(2, 1)
     labels = [names[name] for name in detectors]
     _heat(above, labels, attacks, detected, 100.0 * detected, "Blues", 1.0)
@@ -138,6 +137,8 @@ def _heat(
     axes: Axes, rows: list[str], columns: list[str], colour: Floats, text: Floats, palette: str, most: float | None
 ) -> None:
     """One heat map: coloured by ``colour``, each cell written with ``text``."""
+    from matplotlib import colormaps
+
     top = most if most is not None else max(float(np.nanmax(colour)), 1.0)
     bottom = 0.0 if most is not None else -1.0
     axes.imshow(colour, cmap=colormaps[palette], vmin=bottom, vmax=top, aspect="auto")
@@ -196,8 +197,7 @@ def curves_figure(report: dict[str, Any], attack: str, path: Path) -> None:
     curves.sort(key=_area, reverse=True)
     coloured = curves[:CURVES_DRAWN]
     coloured += [curve for curve in curves[CURVES_DRAWN:] if names[curve["detector"]] == "snapshot"]
-    figure = Figure(figsize=(11.5, 5.2), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.5, 5.2, dpi=120, layout="constrained")
     roc, det = figure.subplots(1, 2)
     for curve in curves:
         if curve not in coloured:

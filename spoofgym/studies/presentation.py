@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from rich.table import Table
 
 from spoofgym import files
+from spoofgym.figures import new_figure
 
 BASELINE, LEARNED, BOUND = "#9a9a9a", "#0072b2", "#d55e00"
 BASELINES = ("none", "random", "best-ramp", "closed-form", "optimum", "upper-bound")
@@ -101,8 +100,7 @@ def attackers_figure(report: dict[str, Any], path: Path) -> None:
     """Bars of the undetected error of each attacker, with intervals, beside the optimum and the upper bound."""
     played = [row for row in report["rows"] if row["mean_undetected_error_m"] is not None]
     bounds = {row["attacker"]: row["exact_undetected_error_m"] for row in report["rows"]}
-    figure = Figure(figsize=(8.0, 0.55 * len(played) + 1.9), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.0, 0.55 * len(played) + 1.9, dpi=120, layout="constrained")
     axes = figure.add_subplot()
     for place, row in enumerate(reversed(played)):
         mean, (low, high) = row["mean_undetected_error_m"], row["ci95_m"]

@@ -17,14 +17,8 @@ from rich.table import Table
 
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
 from spoofgym.console import console, show
-from spoofgym.detectors import make_detector
-from spoofgym.evaluation.defence import play_response
-from spoofgym.evaluation.defence_metrics import defender_score
-from spoofgym.evaluation.defenders import world_of
-from spoofgym.evaluation.report import SCHEMA_VERSION
-from spoofgym.policies.classical import grid
+from spoofgym.evaluation.tuning import tuning_report
 from spoofgym.program import do_all, give_json, program
-from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 
 SEED = 1_000_000_000
@@ -49,29 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
     scenario = make_scenario(options.scenario)
-    world = world_of(scenario, "training", "linear", options.threads, (), grid())
-    rows: list[dict[str, Any]] = []
-    for defender in grid():
-        with terminal.status(defender.name):
-            games = play_response(
-                world,
-                make_detector(defender.detector).name,
-                make_response(defender.response),
-                options.episodes,
-                options.seed,
-            )
-        score = defender_score(games)
-        rows.append(
-            {
-                "detector": defender.detector,
-                "response": defender.response,
-                "mean_error_m": score.mean_error,
-                "ci95_m": list(score.interval),
-                "clean_exclusion_fraction": score.clean_exclusion,
-            }
-        )
-    rows.sort(key=lambda row: float(row["mean_error_m"]))
-    report = {"schema_version": SCHEMA_VERSION, "kind": "tuning", "scenario": scenario.name, "rows": rows}
+    report = tuning_report(scenario, options.episodes, options.seed, options.threads, terminal.status)
     table = tuning_table(report, options.episodes)
     do_all(lambda: show(terminal, table), lambda: give_json(report, options.json))
     return 0

@@ -25,6 +25,7 @@ from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
+from spoofgym.streams import RunStreams
 
 DETECTORS = ("snapshot", "signed-mean:p_fa=0.001")
 EPISODES, EPOCHS, SEED = 30, 60, 11
@@ -210,7 +211,7 @@ def test_a_response_does_not_use_what_is_not_there(played):
 
 def test_a_response_excludes_where_its_detector_alarms(world, played):
     """`exclude` leaves a fix out just while the snapshot's statistic of its own innovations is above the threshold."""
-    simulation = world.simulation(make_response("exclude"), EPISODES, SEED, Demands())
+    simulation = world.simulation(make_response("exclude"), RunStreams.from_seed(SEED, EPISODES), Demands())
     threshold = world.detectors[0].threshold
     simulation.reset()
     for k in range(EPOCHS):

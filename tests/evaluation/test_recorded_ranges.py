@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from spoofgym.evaluation import recorded_ranges
-from spoofgym.evaluation.recorded_ranges import FILTERS, common, game_onsets, main, side_by_side
+from spoofgym.evaluation.recorded_ranges import FILTERS, common, game_onsets, side_by_side
 from spoofgym.logs.log import Fixes
+from spoofgym.studies.recorded_ranges import main
 from tests.logs.range_drive import write_drive
 from tests.logs.test_ranges_log import DRIFT
 from tests.scenarios.test_recorded import write_log

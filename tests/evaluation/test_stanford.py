@@ -8,7 +8,6 @@ from spoofgym.evaluation.stanford import (
     NOMINAL,
     REACH,
     UNAVAILABLE,
-    draw,
     region,
     stanford_diagram,
 )
@@ -65,17 +64,6 @@ def test_epochs_with_an_alarm_are_left_out():
     diagram = stanford_diagram(error, level, 10.0, np.array([[False, True, False]]))
     np.testing.assert_array_equal(diagram.regions, [1, 0, 1, 0])
     assert diagram.counts.sum() == 2
-
-
-def test_the_picture(tmp_path):
-    pytest.importorskip("matplotlib")
-    rng = np.random.default_rng(0)
-    diagram = stanford_diagram(8.0 * rng.random(500), 12.0 * rng.random(500), 10.0)
-    path = tmp_path / "deep" / "stanford.png"
-    draw(diagram, path, "a title")
-    assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    nobody = np.zeros(1)
-    draw(stanford_diagram(nobody, nobody, 10.0, np.array([True])), path)
 
 
 @pytest.mark.parametrize(

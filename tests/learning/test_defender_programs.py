@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
@@ -34,6 +33,7 @@ pytestmark = pytest.mark.xdist_group("defender programs")  # one worker: the run
 
 SCENARIO = "foi-drive:horizon=60"
 SHORT = ["--scenario", SCENARIO, "--detector", "snapshot", "--lanes", "4", "--validation-episodes", "20"]
+SHORT += ["--critic-games", "1"]
 STEPS = 1200
 ROW_KEYS = {
     "defender",
@@ -318,7 +318,7 @@ def test_comparisons_are_paired(run, tmp_path, capsys):
 def test_oracle_depth_is_the_best_depth_of_each_game():
     scenario = make_scenario(SCENARIO)
     world = World(scenario, "training", 0.5, tuple(calibrated_all([make_detector(SIGNED)], scenario)))
-    oracle = defenders.Defenders(world, 25, 3, Console(quiet=True)).oracle_depth(TUNED[0])
+    oracle = defenders.Defenders(world, 25, 3).oracle_depth(TUNED[0])
     errors = []
     for response in (listed.with_depth(depth, "reuse=5") for depth in scenario.depth_table):
         errors.append(play_response(world, SIGNED, make_response(response), 25, 3).error.mean(axis=1))

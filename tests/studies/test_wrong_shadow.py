@@ -11,14 +11,15 @@ from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.envs.observation import spoofer_fields
 from spoofgym.envs.trained import spoofer_config
+from spoofgym.evaluation import wrong_shadow as library
 from spoofgym.evaluation.attackers import Evaluation
+from spoofgym.evaluation.wrong_shadow import RIGHT, Shadow, optimum_player, policy_player, ratio_of_means, wrong_shadows
 from spoofgym.learning import spoofer
 from spoofgym.optimum import bounded_optimum
 from spoofgym.policies.learned import CONFIG_FILE, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import GRADES
 from spoofgym.studies import evaluate, wrong_shadow
-from spoofgym.studies.wrong_shadow import RIGHT, Shadow, optimum_player, policy_player, ratio_of_means, wrong_shadows
 
 SCENARIO = "liu-flight:horizon=20"
 WIDE, TACTICAL = f"{SCENARIO},sigma=7.4", f"{SCENARIO},imu=tactical"
@@ -110,8 +111,8 @@ def test_paired_ratio_covers_the_truth():
 
 
 def test_program(folder, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(wrong_shadow, "SIGMA_FACTORS", (2.0,))
-    monkeypatch.setattr(wrong_shadow, "GRADES", {"tactical": GRADES["tactical"]})
+    monkeypatch.setattr(library, "SIGMA_FACTORS", (2.0,))
+    monkeypatch.setattr(library, "GRADES", {"tactical": GRADES["tactical"]})
     out = tmp_path / "sub" / "out.json"
     arguments = ["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "200", "--threads", "1"]
     assert wrong_shadow.main([*arguments, "--json", str(out)]) == 0

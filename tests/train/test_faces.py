@@ -15,6 +15,7 @@ MOVED = {
     "spoofgym.evaluation.acna_study": "spoofgym.studies.acna",
     "spoofgym.evaluation.integrity_study": "spoofgym.studies.integrity",
     "spoofgym.evaluation.patient_spoofer": "spoofgym.studies.patient_spoofer",
+    "spoofgym.evaluation.recorded_ranges": "spoofgym.studies.recorded_ranges",
     "spoofgym.evaluation.reproduce": "spoofgym.studies.reproduce",
     "spoofgym.evaluation.self_tuning": "spoofgym.studies.self_tuning",
     "spoofgym.evaluation.thresholds": "spoofgym.studies.thresholds",

@@ -12,7 +12,7 @@ from spoofgym.navigation import kalman
 from spoofgym.navigation.batch import FilterBatch
 from spoofgym.navigation.error_model import BIAS, INERTIAL, NUM_NAVIGATION, POSITION, VELOCITY
 from spoofgym.navigation.interface import Demands
-from spoofgym.navigation.linear_model import LinearModel, LinearSteps
+from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
@@ -20,7 +20,7 @@ from spoofgym.streams import RunStreams
 
 
 class ErrorRuns(NamedTuple):
-    """The arrays of `ErrorBatch` that its kernels carry."""
+    """The arrays of `ErrorBatch` that a run goes through an epoch with."""
 
     epoch: Runs
     state: Floats
@@ -120,32 +120,31 @@ class ErrorBatch(FilterBatch):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def carry_error(run: int, steps: LinearSteps, errors: ErrorRuns, noise: Floats, work: Floats) -> int:
-    """Carry one run to its next epoch: x <- Φ x + w, and the true bias; returns the epoch.
-
-    ``noise`` (n,) and ``work`` (9,) are overwritten; noise beyond the first fifteen states is left as it is.
-    """
-    errors.epoch[run] += 1
-    k = errors.epoch[run]
+def draw_process_noise(noise_columns: Floats, normals: Floats, noise: Floats) -> None:
+    """Write the white noise that acts on a run's navigation states up to an epoch, from the epoch's normals (9,)."""
     for i in range(NUM_NAVIGATION):
         noise[i] = 0.0
     for j in range(NUM_NAVIGATION):
-        factor = errors.normals[run, k, j]
+        factor = normals[j]
         for i in range(NUM_NAVIGATION):
-            noise[i] += steps.noise_columns[k, j, i] * factor
-    if errors.bias_steps.shape[1] > 0:
-        for a in range(6):
-            noise[NUM_NAVIGATION + a] = errors.bias_steps[run, k, a]
-            errors.true_bias[run, a] += errors.bias_steps[run, k, a]
-    kalman.predict_error(steps.transition_columns[k], noise, errors.state[run], work)
-    return k
+            noise[i] += noise_columns[j, i] * factor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def carry_unaided(columns: Floats, auxiliary: Floats, nothing: Floats, work: Floats) -> None:
-    """d <- Φ d of the unaided solution minus the filter's, (15,) or (0,); columns (n, 9), nothing (15,) zeros."""
-    if auxiliary.shape[0] > 0:
-        kalman.predict_error(columns[: auxiliary.shape[0]], nothing, auxiliary, work)
+def move_bias(step: Floats, true_bias: Floats, noise: Floats) -> None:
+    """Let the biases of a run (6,) take a step (6,), which acts on their errors, too."""
+    for a in range(6):
+        noise[NUM_NAVIGATION + a] = step[a]
+        true_bias[a] += step[a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def carry_unaided(runs: Runs, index: Runs, transition_columns: Floats, auxiliary: Floats) -> None:
+    """d <- Φ d of the unaided solutions of runs minus the filters', to the epochs that these have reached."""
+    work, nothing = np.empty(NUM_NAVIGATION), np.zeros(auxiliary.shape[1])
+    for run in runs:
+        columns = transition_columns[index[run], : auxiliary.shape[1]]
+        kalman.predict_error(columns, nothing, auxiliary[run], work)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -153,6 +152,6 @@ def observe(observation: Floats, state: Floats, deviation: Floats, residual: Flo
     """z = H x - deviation."""
     for a in range(residual.shape[0]):
         total = -deviation[a]
-        for j in range(NUM_NAVIGATION):
+        for j in range(observation.shape[1]):
             total += observation[a, j] * state[j]
         residual[a] = total

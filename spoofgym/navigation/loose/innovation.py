@@ -9,7 +9,6 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.batch import InnovationArrays
 
 
 class FilterNoise(NamedTuple):
@@ -26,8 +25,16 @@ class FilterNoise(NamedTuple):
     process_scale: Floats
 
 
+class FixNoise(NamedTuple):
+    """The R of some fixes: rows of all R, (r, m, m), one for each of all runs, (N,); and factors, (n,)."""
+
+    covariance: Floats
+    row: Runs
+    scale: Floats
+
+
 class FilterRuns(NamedTuple):
-    """The arrays of a filter of N runs with covariances of their own.
+    """The arrays of N filters with covariances of their own.
 
     Attributes:
         covariance: P, (N, n, n).
@@ -49,31 +56,28 @@ def constant_noise(covariance: Floats, num_runs: int) -> FilterNoise:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def form_innovation(
-    run: int,
-    place: int,
+    covariance: Floats,
     observation: Floats,
-    noise: FilterNoise,
+    noise: Floats,
     noise_scale: float,
-    filters: FilterRuns,
-    formed: InnovationArrays,
-    work: tuple[Floats, Floats],
+    innovation: Floats,
+    gain: Floats,
+    cross: Floats,
+    factor: Floats,
 ) -> None:
-    """S, the whitened gain, the whitened residual and the NIS of one run, whose residual is formed.
+    """S, its factor and the whitened gain of one run.
 
     Args:
-        run: which.
-        place: where the outputs stand.
-        observation: H on the nine navigation states, (m, 9).
-        noise: gives R.
+        covariance: P, (n, n).
+        observation: H, (m, h).
+        noise: R, (m, m).
         noise_scale: factor on it.
-        filters: of all runs; the run's gain is overwritten.
-        formed: the outputs.
-        work: (m, n) and (m, m), overwritten.
+        innovation: S, (m, m), overwritten.
+        gain: U', (m, n), overwritten.
+        cross: (m, n), overwritten.
+        factor: L of S = L L', (m, m), overwritten.
     """
-    cross, factor = work
-    variance, innovation, gain = noise.covariance[noise.row[run]], formed.covariance[place], filters.gain[run]
-    kalman.innovation_covariance(filters.covariance[run], observation, variance, cross, innovation)
-    kalman.scale_noise(noise_scale, variance, innovation)
+    kalman.innovation_covariance(covariance, observation, noise, cross, innovation)
+    kalman.scale_noise(noise_scale, noise, innovation)
     kalman.cholesky(innovation, factor)
     kalman.whitened_gain(cross, factor, gain)
-    formed.nis[place] = kalman.whiten(factor, formed.residual[place], formed.whitened[place])

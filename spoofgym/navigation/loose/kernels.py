@@ -15,7 +15,7 @@ from spoofgym.navigation.batch import InnovationArrays
 from spoofgym.navigation.divergence import Solution, solution_of
 from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
 from spoofgym.navigation.history import Ring, keep
-from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, form_innovation
+from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, FixNoise, form_innovation
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
 
 # rows of the state kept when a fix is taken
@@ -98,7 +98,7 @@ def carry(
     runs: Runs,
     epochs: Runs,
     steps: StrapdownSteps,
-    noise: FilterNoise,
+    process_scale: Floats,
     vehicles: StrapdownRuns,
     ring: Ring,
     auxiliary: Floats,
@@ -108,55 +108,54 @@ def carry(
     Each state is stored in the history before its epoch begins. ``auxiliary`` is the unaided solution minus the
     filter's, which the transition Φ of the filter carries, too; its shape is (N, 15), or (N, 0) if disabled.
     """
+    # named tuples are taken apart here: in the loop that would cost more than the equations
+    samples, bounds, places, latency_samples, density, instability_sigma, instability_decay = steps
+    index, inertial, true_bias, instability, fix, normals = vehicles
+    covariance, remembers = ring.covariance, ring.past_covariance.shape[1] > 0
+    n = covariance.shape[1]
     mean_force, residual_bias, mean = np.empty(3), np.empty(6), np.empty(NUM_NAVIGATION)
-    transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
-    half_noise = np.zeros((NUM_STATES, NUM_STATES))
-    epoch, normals, true_noise = vehicles.epoch, vehicles.normals, steps.samples.true_noise
+    transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, n))
+    half_noise = np.zeros((n, n))
     noisy = normals.shape[2] > 0
     last = normals.shape[2] - NUM_EPOCH_NOISES
     for run in runs:
-        solution, true_bias, fix = solution_of(run, vehicles.solution), vehicles.true_bias[run], vehicles.fix[run]
-        covariance = ring.covariance[run]
+        solution = solution_of(run, inertial)
         for _ in range(epochs[run]):
-            keep(run, epoch[run] + 1, ring)
-            epoch[run] += 1
-            drawn = normals[run, epoch[run] % normals.shape[1]]
+            index[run] += 1
+            k = index[run]
+            if remembers:
+                keep(run, k, ring)
+            drawn = normals[run, k % normals.shape[1]]
             for a in range(6):
-                residual_bias[a] = true_bias[a] - solution.bias[a]
-            begin, end = steps.places[epoch[run]], steps.places[epoch[run] + 1]
-            start, interval = steps.bounds[begin], 0.0
-            taken = steps.bounds[end] - steps.latency_samples
+                residual_bias[a] = true_bias[run, a] - solution.bias[a]
+            begin, end = places[k], places[k + 1]
+            start, interval = bounds[begin], 0.0
+            taken = bounds[end] - latency_samples
             for part in range(begin, end):
                 length = mechanize_part(
-                    (steps.bounds[part], steps.bounds[part + 1], taken),
+                    (bounds[part], bounds[part + 1], taken),
                     residual_bias,
-                    drawn[NUM_SAMPLE_NOISES * (steps.bounds[part] - start) :],
-                    steps.samples,
+                    drawn[NUM_SAMPLE_NOISES * (bounds[part] - start) :],
+                    samples,
                     solution,
-                    fix,
+                    fix[run],
                     mean_force,
                     transition,
                 )
-                for i in range(NUM_STATES):
-                    half_noise[i, i] = 0.5 * length * steps.filter_density[i] * noise.process_scale[run]
-                    covariance[i, i] += half_noise[i, i]
-                kalman.predict_covariance(transition, half_noise, covariance, product)
+                for i in range(n):
+                    half_noise[i, i] = 0.5 * length * density[i] * process_scale[run]
+                    covariance[run, i, i] += half_noise[i, i]
+                kalman.predict_covariance(transition, half_noise, covariance[run], product)
                 if auxiliary.shape[1] > 0:
                     kalman.predict_mean(transition, auxiliary[run], mean)
                 interval += length
             if noisy:
-                disturb_position(solution.position, true_noise, np.sqrt(interval), drawn[last:])
-                _drift_bias(
-                    true_bias,
-                    vehicles.instability[run],
-                    steps.instability_sigma,
-                    steps.instability_decay,
-                    drawn[last:],
-                )
-            if steps.latency_samples == 0:
-                _keep_fix(solution, fix)
+                disturb_position(solution.position, samples.true_noise, np.sqrt(interval), drawn[last:])
+                _drift_bias(true_bias[run], instability[run], instability_sigma, instability_decay, drawn[last:])
+            if latency_samples == 0:
+                _keep_fix(solution, fix[run])
             for a in range(3):
-                fix[FORCE, a] = mean_force[a]
+                fix[run, FORCE, a] = mean_force[a]
 
 
 @njit(cache=True, nogil=True)
@@ -248,42 +247,48 @@ def _drift_bias(true_bias: Floats, instability: Floats, sigma: Floats, decay: fl
 def innovate(
     places: Runs,
     runs: Runs,
+    index: Runs,
+    fix: Floats,
     reference: FixReference,
-    noise: FilterNoise,
-    noise_scale: Floats,
-    vehicles: StrapdownRuns,
+    noise: FixNoise,
     filters: FilterRuns,
     formed: InnovationArrays,
 ) -> None:
-    """Innovation of runs with their own S, and the whitened gain.
+    """Innovation of runs with their own S, and the whitened gain; fix as in `StrapdownRuns`.
 
     Outputs, except the gain, stand at the places of the runs.
     """
-    m = formed.residual.shape[1]
+    fix_position, fix_velocity, lever_arm, latency = reference
+    variance, row, scale = noise
+    covariance, gain, deviation, _ = filters
+    residual, innovation, whitened, nis = formed
+    m = residual.shape[1]
     observation, arm = np.zeros((m, NUM_NAVIGATION)), np.empty(3)
-    cross, factor = np.empty((m, filters.covariance.shape[1])), np.empty((m, m))
+    cross, factor = np.empty((m, covariance.shape[1])), np.empty((m, m))
     for place in places:
         run = runs[place]
-        k, fix = vehicles.epoch[run], vehicles.fix[run]
-        residual, deviation = formed.residual[place], filters.deviation[run]
+        k = index[run]
         for a in range(3):
             arm[a] = 0.0
             for b in range(3):
-                arm[a] += fix[ATTITUDE + a, b] * reference.lever_arm[b]
-        _observation(arm, fix[FORCE], reference.latency, observation)
+                arm[a] += fix[run, ATTITUDE + a, b] * lever_arm[b]
+        _observation(arm, fix[run, FORCE], latency, observation)
         difference = enu_difference(
-            fix[POSITION, 0],
-            fix[POSITION, 1],
-            fix[POSITION, 2],
-            reference.position[k, 0],
-            reference.position[k, 1],
-            reference.position[k, 2],
+            fix[run, POSITION, 0],
+            fix[run, POSITION, 1],
+            fix[run, POSITION, 2],
+            fix_position[k, 0],
+            fix_position[k, 1],
+            fix_position[k, 2],
         )
         for a in range(3):
-            residual[a] = difference[a] + arm[a] - deviation[a]
+            residual[place, a] = difference[a] + arm[a] - deviation[run, a]
         for a in range(3, m):
-            residual[a] = fix[VELOCITY, a - 3] - reference.velocity[k, a - 3] - deviation[a]
-        form_innovation(run, place, observation, noise, noise_scale[place], filters, formed, (cross, factor))
+            residual[place, a] = fix[run, VELOCITY, a - 3] - fix_velocity[k, a - 3] - deviation[run, a]
+        form_innovation(
+            covariance[run], observation, variance[row[run]], scale[place], innovation[place], gain[run], cross, factor
+        )
+        nis[place] = kalman.whiten(factor, residual[place], whitened[place])
 
 
 @njit(cache=True, nogil=True)
@@ -309,14 +314,14 @@ def _put_cross(observation: Floats, row: int, vector: Floats, factor: float) -> 
 
 
 @njit(cache=True, nogil=True)
-def correct(runs: Runs, solution: Solution, filters: FilterRuns) -> None:
+def correct(runs: Runs, solution: Solution, gain: Floats, whitened: Floats, covariance: Floats) -> None:
     """Add the correction -U w, minus the estimated error; P <- P - U U'."""
-    correction = np.empty(filters.gain.shape[2])
+    correction = np.empty(gain.shape[2])
     for run in runs:
         correction[:] = 0.0
-        kalman.correct_error(filters.gain[run], filters.whitened[run], correction)
+        kalman.correct_error(gain[run], whitened[run], correction)
         feed_back(correction, solution_of(run, solution))
-        kalman.update_covariance(filters.gain[run], filters.covariance[run])
+        kalman.update_covariance(gain[run], covariance[run])
 
 
 @njit(cache=True, nogil=True)
@@ -339,12 +344,12 @@ def _move(position: Floats, east: float, north: float, up: float) -> None:
 
 @njit(cache=True, nogil=True)
 def reset(
-    runs: Runs, variance: Floats, noise: FilterNoise, solution: Solution, filters: FilterRuns, residual: Floats
+    runs: Runs, variance: Floats, noise: FilterNoise, solution: Solution, all_covariance: Floats, residual: Floats
 ) -> None:
     """Move position, and velocity where the fix has one, by the residual (n, m); their correlations are forgotten."""
     for place in range(len(runs)):
         run = runs[place]
-        covariance = filters.covariance[run]
+        covariance = all_covariance[run]
         for a in range(residual.shape[1] - 3):
             solution.velocity[run, a] -= residual[place, 3 + a]
             kalman.forget_correlations(3 + a, noise.covariance[noise.row[run], 3 + a, 3 + a], covariance)

@@ -8,12 +8,19 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.batch import InnovationArrays, Weights, empty_innovation
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, POSITION
+from spoofgym.navigation.error_model import NUM_NAVIGATION, POSITION
 from spoofgym.navigation.history import History, Ring, keep
 from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel, LinearSteps
-from spoofgym.navigation.loose.dynamics import ErrorBatch, ErrorRuns, carry_error, carry_unaided, observe
-from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, constant_noise, form_innovation
+from spoofgym.navigation.loose.dynamics import (
+    ErrorBatch,
+    ErrorRuns,
+    carry_unaided,
+    draw_process_noise,
+    move_bias,
+    observe,
+)
+from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, FixNoise, constant_noise, form_innovation
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.streams import RunStreams
@@ -45,8 +52,8 @@ class OwnCovarianceNavigator(ErrorBatch):
         super().__init__(model, grade, interval, num_runs, slices, demands)
         n = model.num_states
         self.covariance = np.zeros((num_runs, n, n))
-        gain = np.zeros((num_runs, model.dimension, n))
-        self._filters = FilterRuns(self.covariance, gain, self._deviation, self._whitened)
+        self._gain = np.zeros((num_runs, model.dimension, n))
+        self._filters = FilterRuns(self.covariance, self._gain, self._deviation, self._whitened)
         self._noise = constant_noise(model.measurement_covariance, num_runs) if noise is None else noise
         self.past = History(demands.history, self.covariance, state=self.state, true_bias=self.true_bias)
 
@@ -56,20 +63,17 @@ class OwnCovarianceNavigator(ErrorBatch):
         self.covariance[runs] = self.model.prior_covariance
 
     def _carry(self, runs: Runs, epochs: Runs, auxiliary: Floats) -> None:
-        _carry(runs, epochs, self.model.steps, self._noise, self._runs, self.past.ring, auxiliary)
+        steps = self.model.steps
+        _carry(runs, epochs, steps, self._noise.process_scale, self._runs, self.past.ring)
+        if auxiliary.shape[1]:
+            carry_unaided(runs, self.index, steps.transition_columns, auxiliary)
 
     def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
         formed = empty_innovation(len(runs), self.model.dimension)
+        noise = FixNoise(self._noise.covariance, self._noise.row, weights.noise_scale)
         self._on_slices(
             lambda part: _innovate(
-                part,
-                runs,
-                self.model.steps.observation,
-                self._noise,
-                weights.noise_scale,
-                self._runs,
-                self._filters,
-                formed,
+                part, runs, self.index, self.state, self.model.observation, noise, self._filters, formed
             ),
             self._all[: len(runs)],
         )
@@ -77,11 +81,12 @@ class OwnCovarianceNavigator(ErrorBatch):
         return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:
-        self._on_slices(lambda part: _correct(part, self.state, self._filters), runs)
+        self._on_slices(lambda part: _correct(part, self._gain, self._whitened, self.state, self.covariance), runs)
 
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
         """Position and, where the receiver gives it, velocity jump to the fix; their correlations are forgotten."""
-        _reset(runs, variance, self.model.steps.observation, self._noise, self._runs, self._filters)
+        observation = self.model.observation
+        _reset(runs, variance, self.index, self.state, observation, self._noise, self._filters)
 
     def _past_error(self, epochs: Runs) -> Floats:
         state: Floats = self.past.recall("state", epochs)
@@ -105,64 +110,72 @@ def _scaled(process_noise: Floats, scale: float, work: Floats) -> Floats:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carry(
-    runs: Runs,
-    epochs: Runs,
-    steps: LinearSteps,
-    noise: FilterNoise,
-    errors: ErrorRuns,
-    ring: Ring,
-    auxiliary: Floats,
-) -> None:
+def _carry(runs: Runs, epochs: Runs, steps: LinearSteps, process_scale: Floats, errors: ErrorRuns, ring: Ring) -> None:
     """Carry runs over so many epochs each: keep the states, x <- Φ x + w, P <- Φ P Φ' + Q."""
-    n = errors.state.shape[1]
-    work, white, nothing = np.empty(NUM_NAVIGATION), np.zeros(n), np.zeros(NUM_STATES)
+    # named tuples are taken apart here: in the loop that would cost more than the equations
+    transition_columns, transition, process_noise, noise_columns = steps
+    index, state, true_bias, normals, bias_steps = errors
+    covariance, remembers = ring.covariance, ring.past_covariance.shape[1] > 0
+    n = state.shape[1]
+    work, noise = np.empty(NUM_NAVIGATION), np.zeros(n)
     product, scaled = np.empty((NUM_NAVIGATION, n)), np.empty((n, n))
     for run in runs:
         for _ in range(epochs[run]):
-            keep(run, errors.epoch[run] + 1, ring)
-            k = carry_error(run, steps, errors, white, work)
-            carry_unaided(steps.transition_columns[k], auxiliary[run], nothing, work)
-            process_noise = _scaled(steps.process_noise[k], noise.process_scale[run], scaled)
-            kalman.predict_covariance(steps.transition[k], process_noise, ring.covariance[run], product)
+            index[run] += 1
+            k = index[run]
+            if remembers:
+                keep(run, k, ring)
+            draw_process_noise(noise_columns[k], normals[run, k], noise)
+            if bias_steps.shape[1] > 0:
+                move_bias(bias_steps[run, k], true_bias[run], noise)
+            kalman.predict_error(transition_columns[k], noise, state[run], work)
+            noise_added = _scaled(process_noise[k], process_scale[run], scaled)
+            kalman.predict_covariance(transition[k], noise_added, covariance[run], product)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _innovate(
     places: Runs,
     runs: Runs,
+    index: Runs,
+    state: Floats,
     observation: Floats,
-    noise: FilterNoise,
-    noise_scale: Floats,
-    errors: ErrorRuns,
+    noise: FixNoise,
     filters: FilterRuns,
     formed: InnovationArrays,
 ) -> None:
     """Innovation with each run's own S, and its whitened gain; outputs but the gain stand at the places of the runs."""
+    variance, row, scale = noise
+    covariance, gain, deviation, _ = filters
+    residual, innovation, whitened, nis = formed
     m = observation.shape[1]
-    cross, factor = np.empty((m, errors.state.shape[1])), np.empty((m, m))
+    cross, factor = np.empty((m, state.shape[1])), np.empty((m, m))
     for place in places:
         run = runs[place]
-        matrix = observation[errors.epoch[run]]
-        observe(matrix, errors.state[run], filters.deviation[run], formed.residual[place])
-        form_innovation(run, place, matrix, noise, noise_scale[place], filters, formed, (cross, factor))
+        matrix = observation[index[run]]
+        observe(matrix, state[run], deviation[run], residual[place])
+        form_innovation(
+            covariance[run], matrix, variance[row[run]], scale[place], innovation[place], gain[run], cross, factor
+        )
+        nis[place] = kalman.whiten(factor, residual[place], whitened[place])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _correct(runs: Runs, state: Floats, filters: FilterRuns) -> None:
+def _correct(runs: Runs, gain: Floats, whitened: Floats, state: Floats, covariance: Floats) -> None:
     """x <- x - U w, P <- P - U U'."""
     for run in runs:
-        kalman.correct_error(filters.gain[run], filters.whitened[run], state[run])
-        kalman.update_covariance(filters.gain[run], filters.covariance[run])
+        kalman.correct_error(gain[run], whitened[run], state[run])
+        kalman.update_covariance(gain[run], covariance[run])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _reset(
     runs: Runs,
     variance: Floats,
+    index: Runs,
+    state: Floats,
     observation: Floats,
     noise: FilterNoise,
-    errors: ErrorRuns,
     filters: FilterRuns,
 ) -> None:
     """Move velocity, then position, by what is left of the residual, so that it becomes zero."""
@@ -170,13 +183,13 @@ def _reset(
     residual = np.empty(m)
     for place in range(len(runs)):
         run = runs[place]
-        matrix, state, covariance = observation[errors.epoch[run]], errors.state[run], filters.covariance[run]
+        matrix, covariance, deviation = observation[index[run]], filters.covariance[run], filters.deviation[run]
         if m == 6:
-            observe(matrix, state, filters.deviation[run], residual)
+            observe(matrix, state[run], deviation, residual)
             for a in range(3):
-                state[3 + a] -= residual[3 + a]
+                state[run, 3 + a] -= residual[3 + a]
                 kalman.forget_correlations(3 + a, noise.covariance[noise.row[run], 3 + a, 3 + a], covariance)
-        observe(matrix, state, filters.deviation[run], residual)
+        observe(matrix, state[run], deviation, residual)
         for a in range(3):
-            state[6 + a] -= residual[a]
+            state[run, 6 + a] -= residual[a]
             kalman.forget_correlations(6 + a, variance[place], covariance)

@@ -7,12 +7,12 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.batch import InnovationArrays, SharedGains, Weights, empty_innovation
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, POSITION
+from spoofgym.navigation.batch import InnovationArrays, SharedGains, Weights
+from spoofgym.navigation.error_model import NUM_NAVIGATION, POSITION
 from spoofgym.navigation.history import History
 from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
-from spoofgym.navigation.linear_model import LinearGains, LinearModel, LinearSteps
-from spoofgym.navigation.loose.dynamics import ErrorBatch, ErrorRuns, carry_error, carry_unaided, observe
+from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose.dynamics import ErrorBatch, carry_unaided, draw_process_noise, move_bias, observe
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
 
@@ -39,19 +39,36 @@ class LinearNavigator(SharedGains, ErrorBatch):
         self.past = History(0, np.zeros((num_runs, 0, 0)))
 
     def _carry(self, runs: Runs, epochs: Runs, auxiliary: Floats) -> None:
-        _carry(runs, epochs, self.model.steps, self._runs, auxiliary)
+        """One epoch: no run can go back."""
+        columns, noise_columns = self.model.steps.transition_columns, self.model.steps.noise_columns
+        _carry(runs, self.index, columns, noise_columns, self.normals, self.bias_steps, self.state, self.true_bias)
+        if auxiliary.shape[1]:
+            carry_unaided(runs, self.index, columns, auxiliary)
 
     def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
-        model, deviation = self.model, self._deviation
-        formed = empty_innovation(len(runs), model.dimension)
+        model, m = self.model, self.model.dimension
+        covariance = model.innovation_covariance[self.index[runs]]
+        formed = InnovationArrays(np.empty((len(runs), m)), covariance, np.empty((len(runs), m)), np.empty(len(runs)))
         self._on_slices(
-            lambda part: _innovate(part, runs, model.gains, self._runs, deviation, formed), self._all[: len(runs)]
+            lambda part: _innovate(
+                part,
+                runs,
+                self.index,
+                self.state,
+                model.observation,
+                model.innovation_factor,
+                self._deviation,
+                formed,
+            ),
+            self._all[: len(runs)],
         )
         self._whitened[runs] = formed.whitened
-        return Innovation(formed.residual, model.innovation_covariance[self.index[runs]], formed.whitened, formed.nis)
+        return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:
-        self._on_slices(lambda part: _correct(part, self.model.gains, self._runs, self._whitened), runs)
+        self._on_slices(
+            lambda part: _correct(part, self.index, self.model.whitened_gain, self._whitened, self.state), runs
+        )
 
     @property
     def position_covariance(self) -> Floats:
@@ -60,29 +77,49 @@ class LinearNavigator(SharedGains, ErrorBatch):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carry(runs: Runs, epochs: Runs, steps: LinearSteps, errors: ErrorRuns, auxiliary: Floats) -> None:
-    """Carry runs over so many epochs each."""
-    work, noise, nothing = np.empty(NUM_NAVIGATION), np.zeros(errors.state.shape[1]), np.zeros(NUM_STATES)
+def _carry(
+    runs: Runs,
+    index: Runs,
+    transition_columns: Floats,
+    noise_columns: Floats,
+    normals: Floats,
+    bias_steps: Floats,
+    state: Floats,
+    true_bias: Floats,
+) -> None:
+    """Carry runs to their next epoch: x <- Φ x + w, and the true biases."""
+    work, noise = np.empty(NUM_NAVIGATION), np.zeros(state.shape[1])
     for run in runs:
-        for _ in range(epochs[run]):
-            k = carry_error(run, steps, errors, noise, work)
-            carry_unaided(steps.transition_columns[k], auxiliary[run], nothing, work)
+        index[run] += 1
+        k = index[run]
+        draw_process_noise(noise_columns[k], normals[run, k], noise)
+        if bias_steps.shape[1] > 0:
+            move_bias(bias_steps[run, k], true_bias[run], noise)
+        kalman.predict_error(transition_columns[k], noise, state[run], work)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _innovate(
-    places: Runs, runs: Runs, gains: LinearGains, errors: ErrorRuns, deviation: Floats, formed: InnovationArrays
+    places: Runs,
+    runs: Runs,
+    index: Runs,
+    state: Floats,
+    observation: Floats,
+    factor: Floats,
+    deviation: Floats,
+    formed: InnovationArrays,
 ) -> None:
     """Innovation with shared S; outputs stand at the places of the runs."""
+    residual, whitened, nis = formed.residual, formed.whitened, formed.nis
     for place in places:
         run = runs[place]
-        k = errors.epoch[run]
-        observe(gains.observation[k], errors.state[run], deviation[run], formed.residual[place])
-        formed.nis[place] = kalman.whiten(gains.innovation_factor[k], formed.residual[place], formed.whitened[place])
+        k = index[run]
+        observe(observation[k], state[run], deviation[run], residual[place])
+        nis[place] = kalman.whiten(factor[k], residual[place], whitened[place])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _correct(runs: Runs, gains: LinearGains, errors: ErrorRuns, whitened: Floats) -> None:
+def _correct(runs: Runs, index: Runs, gain: Floats, whitened: Floats, state: Floats) -> None:
     """x <- x - U w."""
     for run in runs:
-        kalman.correct_error(gains.whitened_gain[errors.epoch[run]], whitened[run], errors.state[run])
+        kalman.correct_error(gain[index[run]], whitened[run], state[run])

@@ -17,7 +17,7 @@ from spoofgym.navigation.history import History
 from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.loose import kernels
 from spoofgym.navigation.loose.inertial import InertialBatch
-from spoofgym.navigation.loose.innovation import FilterNoise
+from spoofgym.navigation.loose.innovation import FilterNoise, FixNoise
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
@@ -83,21 +83,15 @@ class StrapdownNavigator(InertialBatch):
 
     def _carry(self, runs: Runs, epochs: Runs, auxiliary: Floats) -> None:
         self._draw(runs)
-        kernels.carry(runs, epochs, self.model.steps, self._noise, self._vehicles, self.past.ring, auxiliary)
+        scale, ring = self._noise.process_scale, self.past.ring
+        kernels.carry(runs, epochs, self.model.steps, scale, self._vehicles, ring, auxiliary)
 
     def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
         formed = empty_innovation(len(runs), self.model.dimension)
+        noise = FixNoise(self._noise.covariance, self._noise.row, weights.noise_scale)
+        reference = self.model.reference
         self._on_slices(
-            lambda part: kernels.innovate(
-                part,
-                runs,
-                self.model.reference,
-                self._noise,
-                weights.noise_scale,
-                self._vehicles,
-                self._filters,
-                formed,
-            ),
+            lambda part: kernels.innovate(part, runs, self.index, self._fix, reference, noise, self._filters, formed),
             self._all[: len(runs)],
         )
         lost = self._lost(runs, formed.nis)
@@ -107,8 +101,10 @@ class StrapdownNavigator(InertialBatch):
         return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:
-        self._on_slices(lambda part: kernels.correct(part, self._inertial, self._filters), runs)
+        self._on_slices(
+            lambda part: kernels.correct(part, self._inertial, self._gain, self._whitened, self.covariance), runs
+        )
 
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
         """Position and, where the receiver gives it, velocity jump to the fix; their correlations are forgotten."""
-        kernels.reset(runs, variance, self._noise, self._inertial, self._filters, self._residual[runs])
+        kernels.reset(runs, variance, self._noise, self._inertial, self.covariance, self._residual[runs])
