@@ -16,21 +16,13 @@ from spoofgym.clean_starts import far_too_low, require_clean_starts
 from spoofgym.detectors.base import Detector, statistic_of
 from spoofgym.fitting import fit_attack, fit_detectors, fit_response
 from spoofgym.navigation.divergence import diverged_error
-from spoofgym.navigation.interface import (
-    NO_DEMANDS,
-    Clock,
-    Decision,
-    Demands,
-    Epoch,
-    FilterView,
-    Innovation,
-    Spoof,
-)
+from spoofgym.navigation.interface import NO_DEMANDS, Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
+from spoofgym.navigation.white import white_epochs
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 from spoofgym.sensors.confounders import Confounders
-from spoofgym.streams import RunStreams
+from spoofgym.streams import RunStreams, given_streams
 
 OWNER = "Simulation"
 ON_DIVERGENCE = ("raise", "hold")
@@ -99,7 +91,7 @@ class Simulation:
         self._family = family = scenario.family
         self.fidelity = fidelity
         self.num_runs = num_runs
-        self.streams = _streams(seed, streams, num_runs)
+        self.streams = given_streams(OWNER, seed, streams, num_runs)
         fit_detectors(OWNER, detectors, scenario, num_runs)
         self.detectors = {detector.name: detector for detector in detectors}
         self.attack = attack
@@ -241,17 +233,12 @@ class Simulation:
         )
 
     def _white_epochs(self, runs: Runs) -> list[Epoch]:
-        """Innovations of a matched filter before epoch 0, which are independent of its state: drawn directly."""
-        m, memory = self.scenario.dimension, self._white_memory
+        """The epochs before epoch 0 that a matched filter's detectors remember: drawn directly."""
+        memory, m = self._white_memory, self.scenario.dimension
         if memory == 0:
             return []
-        whitened = np.stack([self.streams(run, "memory").standard_normal((memory, m)) for run in runs])
-        white, epochs = self._family.white_innovations(), []
-        for k in range(memory):
-            index = np.full(len(runs), k - memory)
-            time = self.scenario.timeline.start + index * self.scenario.timeline.interval
-            epochs.append(Epoch(index, time, white.innovation(k - memory, whitened[:, k])))
-        return epochs
+        normals = np.stack([self.streams(run, "memory").standard_normal((memory, m)) for run in runs])
+        return white_epochs(self._family.white_innovations(), self.scenario.timeline, normals)
 
     def _test(self, epoch: Epoch, detectors: dict[str, Detector]) -> NDArray[np.bool_]:
         """Let the detectors see an epoch, in order; whether any alarms, (n,).
@@ -396,17 +383,6 @@ class Simulation:
         if self.response is not None:
             part = self.response.begin(runs, self._seen_by_response(epoch), self.alarm[runs])
             self.decision = self.decision.put(runs, part)
-
-
-def _streams(seed: int | None, streams: RunStreams | None, num_runs: int) -> RunStreams:
-    """The given random streams, or those of a seed."""
-    if streams is None:
-        return RunStreams.from_seed(validation.seed(OWNER, seed), num_runs)
-    validation.instance(OWNER, "streams", streams, RunStreams, "random streams, or None")
-    validation.at_most_one(OWNER, seed=seed, streams=streams)
-    if len(streams) != num_runs:
-        raise ValueError(f"{OWNER}: streams must be those of {num_runs} runs, got {len(streams)}")
-    return streams
 
 
 class _Trial(Simulation):

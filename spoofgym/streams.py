@@ -81,6 +81,28 @@ class RunStreams:
         return child
 
 
+def given_streams(owner: str, seed: int | None, streams: RunStreams | None, num_runs: int) -> RunStreams:
+    """The given random streams, or those of a seed where none are given.
+
+    Args:
+        owner: whose arguments, for messages.
+        seed: of run 0; None = fresh entropy.
+        streams: of ``num_runs`` runs; None = those of the seed.
+        num_runs: N.
+
+    Raises:
+        ValueError: both are given, or streams of another number of runs, or a seed that is none.
+        TypeError: the streams are none.
+    """
+    if streams is None:
+        return RunStreams.from_seed(validation.seed(owner, seed), num_runs)
+    validation.instance(owner, "streams", streams, RunStreams, "random streams, or None")
+    validation.at_most_one(owner, seed=seed, streams=streams)
+    if len(streams) != num_runs:
+        raise ValueError(f"{owner}: streams must be those of {num_runs} runs, got {len(streams)}")
+    return streams
+
+
 def _sequence(generator: np.random.Generator) -> np.random.SeedSequence:
     return cast(np.random.SeedSequence, generator.bit_generator.seed_seq)
 

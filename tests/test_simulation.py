@@ -283,7 +283,7 @@ def test_an_alarm_in_every_burn_in_all_the_same_names_the_thresholds(monkeypatch
 )
 def test_a_scenario_that_does_not_fit_is_refused(changes, message):
     with pytest.raises(ValueError, match=message):
-        dataclasses.replace(matched(), **changes)
+        matched().changed(**changes)
 
 
 class BeforeTheGame(Detector):

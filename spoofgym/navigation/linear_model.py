@@ -194,24 +194,24 @@ def _cross(vectors: Floats) -> Floats:
 
 
 def linear_model(
-    dynamics: ErrorDynamics, prior_covariance: Floats, tuning: FilterTuning, timeline: Timeline
+    dynamics: ErrorDynamics, prior_covariance: Floats, measurement_covariance: Floats, timeline: Timeline
 ) -> LinearModel:
     """The game on epochs 0..K of ``dynamics``, every fix used.
 
     Args:
         dynamics: of the K+1 epochs of the game.
         prior_covariance: the filter's P after epoch -1, (15, 15).
-        tuning: gives R.
+        measurement_covariance: the filter's R, (m, m).
         timeline: of the game.
     """
-    covariance, factor, gain, innovation = filter_gains(dynamics, prior_covariance, tuning.measurement_covariance)
+    covariance, factor, gain, innovation = filter_gains(dynamics, prior_covariance, measurement_covariance)
     return LinearModel(
         time=timeline.times,
         transition=dynamics.transition,
         process_noise=dynamics.process_noise,
         noise_factor=np.array([semidefinite_factor(q) for q in dynamics.true_noise]),
         observation=dynamics.observation,
-        measurement_covariance=tuning.measurement_covariance,
+        measurement_covariance=measurement_covariance,
         prior_covariance=prior_covariance,
         covariance=covariance,
         innovation_covariance=innovation,
@@ -226,14 +226,14 @@ def filter_gains(
     """The filter's covariance recursion with every fix used.
 
     Returns:
-        P before the fix (E, 15, 15), L (E, m, m), U' (E, m, 15), S (E, m, m).
+        P before the fix (E, n, n), L (E, m, m), U' (E, m, n), S (E, m, m); n is that of the prior covariance.
     """
-    epochs, m, _ = dynamics.observation.shape
-    prior = np.empty((epochs, NUM_STATES, NUM_STATES))
+    n, (epochs, m, _) = len(prior_covariance), dynamics.observation.shape
+    prior = np.empty((epochs, n, n))
     factor, innovation = np.empty((epochs, m, m)), np.empty((epochs, m, m))
-    gain = np.empty((epochs, m, NUM_STATES))
+    gain = np.empty((epochs, m, n))
     covariance = prior_covariance.copy()
-    cross, work = np.empty((m, NUM_STATES)), np.empty((NUM_NAVIGATION, NUM_STATES))
+    cross, work = np.empty((m, n)), np.empty((NUM_NAVIGATION, n))
     for k in range(epochs):
         kalman.predict_covariance(dynamics.transition[k], dynamics.process_noise[k], covariance, work)
         prior[k] = covariance

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats
-from spoofgym.navigation.interface import Innovation
+from spoofgym.navigation.interface import Epoch, Innovation
+from spoofgym.timeline import Timeline
 
 
 @dataclass(frozen=True)
@@ -48,3 +49,20 @@ class WhiteInnovations:
             nis += whitened[:, j] ** 2
         covariance = np.broadcast_to(self.covariance[k], (n, m, m))
         return Innovation(residual, covariance, whitened, nis, response, present)
+
+
+def white_epochs(white: WhiteInnovations, timeline: Timeline, normals: Floats) -> list[Epoch]:
+    """The last epochs before epoch 0 of a timeline, of a matched filter: its innovations do not depend on its state.
+
+    Args:
+        white: what innovations are made of.
+        timeline: of the game.
+        normals: standard normals of each run and epoch, (n, epochs, m).
+    """
+    n, memory, _ = normals.shape
+    epochs = []
+    for k in range(-memory, 0):
+        index = np.full(n, k)
+        time = timeline.start + index * timeline.interval
+        epochs.append(Epoch(index, time, white.innovation(k, normals[:, memory + k])))
+    return epochs

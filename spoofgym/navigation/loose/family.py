@@ -163,7 +163,8 @@ class LooseFamily(FixFamily):
         """The game in the linear fidelity, from epoch -burn_in on, under the filter with constant R and Q."""
         first, timeline = self.truth.first(burn_in), self.truth.timeline_from(burn_in)
         dynamics = self.epochs(first, first + timeline.num_epochs + 1)
-        return linear_model(dynamics, self.warm_start(burn_in).filter_covariance, self.tuning, timeline)
+        prior = self.warm_start(burn_in).filter_covariance
+        return linear_model(dynamics, prior, self.tuning.measurement_covariance, timeline)
 
     def _strapdown_model(self, burn_in: int) -> StrapdownModel:
         """The game in the strapdown fidelity, from epoch -burn_in on."""
