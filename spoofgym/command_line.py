@@ -27,21 +27,12 @@ class Parser(argparse.ArgumentParser):
 
 def count(text: str) -> int:
     """A whole number of 1 or more; ``1e6`` and ``1_000_000`` are understood."""
-    return _whole(text, 1)
-
-
-def count_or_none(text: str) -> int:
-    """A whole number of 0 or more, written as that of `count`."""
-    return _whole(text, 0)
-
-
-def _whole(text: str, least: int) -> int:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or value != int(value) or value < least:
-        raise argparse.ArgumentTypeError(f"expected a whole number, {least} or more, got {text!r}")
+    if not math.isfinite(value) or value != int(value) or value < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number, 1 or more, got {text!r}")
     if value > MOST_COUNT:
         raise argparse.ArgumentTypeError(f"expected a whole number, {MOST_COUNT:,} or less, got {text!r}")
     return int(value)

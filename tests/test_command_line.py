@@ -11,7 +11,7 @@ def parser():
     result = Parser(prog="x")
     add_json(result)
     add_figure(result)
-    for name in ("count", "count_or_none", "seed_number", "learner_seed", "threads", "above_one", "run_folder"):
+    for name in ("count", "seed_number", "learner_seed", "threads", "above_one", "run_folder"):
         result.add_argument(f"--{name}", type=getattr(command_line, name))
     return result
 
@@ -26,7 +26,6 @@ def parser():
         ("--count", "many", "expected a whole number, 1 or more, got 'many'"),
         ("--count", "1e30", "expected a whole number, 1,000,000,000,000 or less, got '1e30'"),
         ("--count", "1000000000001", "expected a whole number, 1,000,000,000,000 or less, got '1000000000001'"),
-        ("--count_or_none", "-1", "expected a whole number, 0 or more, got '-1'"),
         ("--learner_seed", "-1", "expected a whole number, 0 or more, got '-1'"),
         ("--learner_seed", "4294967296", "--learner_seed: expected a whole number from 0 to 4294967295, got"),
         ("--seed_number", "-1", "expected a whole number, 0 or more, got '-1'"),
@@ -60,9 +59,9 @@ def test_what_is_wrong_is_told_in_one_line(parser, option, value, words, tmp_pat
 def test_what_is_right_is_understood(parser, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     given = ["--count", "1e6", "--threads", "2", "--json", "-", "--figure", "a/b.PNG", "--run_folder", "x[/y]"]
-    given += ["--seed_number", "4294967296", "--learner_seed", "4294967295", "--count_or_none", "0"]
+    given += ["--seed_number", "4294967296", "--learner_seed", "4294967295"]
     options = parser.parse_args(given)
     assert (options.count, options.threads, options.json) == (1_000_000, 2, "-")
     assert (str(options.figure), str(options.run_folder)) == ("a/b.PNG", "x[/y]")
-    assert (options.seed_number, options.learner_seed, options.count_or_none) == (2**32, 2**32 - 1, 0)
+    assert (options.seed_number, options.learner_seed) == (2**32, 2**32 - 1)
     assert list(tmp_path.iterdir()) == []

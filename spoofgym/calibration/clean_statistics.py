@@ -111,9 +111,3 @@ def joint_statistics(scenario: Scenario, fidelity: str, threads: int = 1) -> Joi
         return [(watch.peak[:, None], values) for watch, values in zip(watches, kept, strict=True)]
 
     return statistics
-
-
-def simulated_statistics(scenario: Scenario, fidelity: str, threads: int = 1) -> CleanStatistics:
-    """Statistics of one detector on clean runs of a scenario, as `joint_statistics` gives them of several."""
-    joint = joint_statistics(scenario, fidelity, threads)
-    return lambda detector, runs, rng: joint([detector], runs, rng)[0]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from spoofgym.attacks import AttackPool, RandomJump, make_attack
+from spoofgym.attacks import RandomJump, make_attack
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.navigation.interface import Clock
 from spoofgym.streams import RunStreams
 from spoofgym.timeline import Timeline, manoeuvre_times

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spoofgym.attacks import AttackPool, make_attack
+from spoofgym.attacks import make_attack
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.navigation.interface import Clock
 from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.scenarios import make_scenario

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from spoofgym.attacks import AttackPool, Partial, make_attack
+from spoofgym.attacks import Partial, make_attack
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation

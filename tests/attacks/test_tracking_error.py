@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from spoofgym.attacks import AttackPool, make_attack
+from spoofgym.attacks import make_attack
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.attacks.tracking_error import TrackingError
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.navigation.interface import Clock

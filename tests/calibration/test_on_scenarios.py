@@ -12,11 +12,12 @@ from scipy import stats
 
 from spoofgym.calibration import calibrate, calibrated, measure_arl0
 from spoofgym.calibration import thresholds as calibration
-from spoofgym.calibration.clean_statistics import simulated_statistics, white_statistics
+from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.detectors import Ensemble, make_detector
 from spoofgym.detectors.chi_square import WINDOWED_THRESHOLDS
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenarios import make_scenario
+from tests.one_detector import simulated_statistics
 
 DEVIATIONS = 6.0
 FALSE_FAILURE = 1e-8

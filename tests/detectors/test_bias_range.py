@@ -5,13 +5,13 @@ import pytest
 
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated, measure_arl0
-from spoofgym.calibration.clean_statistics import simulated_statistics
 from spoofgym.detectors import BiasRange, make_detector
 from spoofgym.detectors import at_arl0 as with_arl0
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
+from tests.one_detector import simulated_statistics
 
 DEGREE_PER_HOUR = np.pi / 180 / 3600
 MICRO_G = 9.80665e-6

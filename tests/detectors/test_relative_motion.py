@@ -6,11 +6,11 @@ import pytest
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.calibration import thresholds as calibration
-from spoofgym.calibration.clean_statistics import simulated_statistics
 from spoofgym.detectors import RelativeMotion, make_detector
 from spoofgym.navigation.interface import Decision, Demands, Epoch, Innovation
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
+from tests.one_detector import simulated_statistics
 
 SCENARIO = "liu-flight:horizon=40"
 

@@ -12,13 +12,18 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from spoofgym.command_line import Parser, count_or_none, seed_number
+from spoofgym.command_line import Parser, count, seed_number
 from spoofgym.program import program
 from tests.stress import arguments, kills, logs, steps
 from tests.stress.progress import Progress
 
 Fuzz = Callable[[int, int], list[str]]
 """Makes tries from a seed; the broken promises."""
+
+
+def count_or_none(text: str) -> int:
+    """A whole number of 0 or more."""
+    return 0 if text == "0" else count(text)
 
 
 def parser() -> argparse.ArgumentParser:

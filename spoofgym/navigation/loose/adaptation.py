@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -231,29 +232,56 @@ def next_scale(scale: float, ratio: float, cumulative: bool, ratio_range: Floats
     return min(max(base * np.sqrt(ratio), scale_range[0]), scale_range[1])
 
 
+class Rules(NamedTuple):
+    """How all runs tune themselves.
+
+    Attributes:
+        window: w, fixes.
+        delay: fixes between the windows' end and the present one.
+        frozen_above: NIS above which nothing is adapted.
+        cumulative: whether √α multiplies the last factor on Q₀, or 1.
+        ratio_range: least and greatest α, (2,).
+        scale_range: least and greatest factor on Q₀, (2,).
+        noise_range: least and greatest factor on the initial standard deviations of R, (2,).
+        initial: R that every run begins with, (m, m).
+    """
+
+    window: int
+    delay: int
+    frozen_above: float
+    cumulative: bool
+    ratio_range: Floats
+    scale_range: Floats
+    noise_range: Floats
+    initial: Floats
+
+
+class LastFixes(NamedTuple):
+    """The last innovations of all runs: S (N, m, m), γ (N, m), NIS (N,), and the factor on R they were formed with."""
+
+    innovation: Floats
+    gamma: Floats
+    nis: Floats
+    weight: Floats
+
+
+class Learnt(NamedTuple):
+    """What all runs have learnt: windows of v and γ (N, L, m), fixes in them (N,), α (N,), R (N, m, m), factor (N,)."""
+
+    residuals: Floats
+    innovations: Floats
+    fixes: Runs
+    ratio: Floats
+    noise: Floats
+    scale: Floats
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def adapt(
-    runs: Runs,
-    innovation: Floats,
-    gamma: Floats,
-    nis: Floats,
-    weight: Floats,
-    window: int,
-    delay: int,
-    frozen_above: float,
-    cumulative: bool,
-    ratio_range: Floats,
-    scale_range: Floats,
-    noise_range: Floats,
-    initial: Floats,
-    residuals: Floats,
-    innovations: Floats,
-    count: Runs,
-    ratio: Floats,
-    noise: Floats,
-    scale: Floats,
-) -> None:
-    """Renew R and the factor on Q of runs that have just used a fix; shapes as in `SelfTuning`."""
+def adapt(runs: Runs, rules: Rules, last_fixes: LastFixes, learnt: Learnt) -> None:
+    """Renew R and the factor on Q of runs that have just used a fix."""
+    window, delay, frozen_above, cumulative, ratio_range, scale_range, noise_range, initial = rules
+    innovation, gamma, nis, weight = last_fixes
+    residuals, innovations, count, ratio, noise, scale = learnt
     m = gamma.shape[1]
     used, factor, weighted = np.empty((m, m)), np.empty((m, m)), np.empty((m, m))
     whitened, post, mean = np.empty(m), np.empty((m, m)), np.empty((m, m))

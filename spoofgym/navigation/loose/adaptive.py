@@ -10,7 +10,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.batch import FilterBatch, Weights
 from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose.adaptation import Adaptation, adapt, negative_ratio
+from spoofgym.navigation.loose.adaptation import Adaptation, LastFixes, Learnt, Rules, adapt, negative_ratio
 from spoofgym.navigation.loose.innovation import FilterNoise
 from spoofgym.navigation.loose.own_gains import GRAIN, OwnCovarianceNavigator
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
@@ -43,13 +43,21 @@ class SelfTuning:
         self.scale = np.ones(num_runs)
         self.ratio = np.ones(num_runs)
         self.count = np.zeros(num_runs, dtype=np.int64)
-        self._initial = np.array(initial)
-        self._residuals = np.zeros((num_runs, length, m))
-        self._innovations = np.zeros((num_runs, length, m))
-        self._covariance = np.zeros((num_runs, m, m))
-        self._gamma = np.zeros((num_runs, m))
-        self._nis = np.zeros(num_runs)
-        self._weight = np.ones(num_runs)
+        residuals, innovations = np.zeros((num_runs, length, m)), np.zeros((num_runs, length, m))
+        self._learnt = Learnt(residuals, innovations, self.count, self.ratio, self.noise, self.scale)
+        self._last_fixes = LastFixes(
+            np.zeros((num_runs, m, m)), np.zeros((num_runs, m)), np.zeros(num_runs), np.ones(num_runs)
+        )
+        self._rules = Rules(
+            adaptation.window,
+            adaptation.delay,
+            adaptation.frozen_above,
+            not adaptation.has("non-cumulative"),
+            adaptation.ratio_range,
+            adaptation.scale_range,
+            adaptation.noise_range,
+            np.array(initial),
+        )
         self._slices = slices
 
     @property
@@ -64,17 +72,18 @@ class SelfTuning:
 
     def reset(self, runs: Runs) -> None:
         """Forget what runs have learnt."""
-        self.noise[runs] = self._initial
+        self.noise[runs] = self._rules.initial
         self.scale[runs] = 1.0
         self.ratio[runs] = 1.0
         self.count[runs] = 0
 
     def note(self, runs: Runs, innovation: Innovation, weight: Floats) -> None:
         """Keep the innovation of runs, formed with R times ``weight`` (n,), until its fix is used."""
-        self._covariance[runs] = innovation.covariance
-        self._gamma[runs] = innovation.residual
-        self._nis[runs] = innovation.nis
-        self._weight[runs] = weight
+        fixes = self._last_fixes
+        fixes.innovation[runs] = innovation.covariance
+        fixes.gamma[runs] = innovation.residual
+        fixes.nis[runs] = innovation.nis
+        fixes.weight[runs] = weight
 
     def adapt(self, runs: Runs, index: Runs, time: Floats) -> None:
         """Renew R and the factor on Q of runs that have used a fix.
@@ -87,36 +96,12 @@ class SelfTuning:
         Raises:
             NegativeRatioError: an unguarded run has met α < 0.
         """
-        self._slices.call(self._adapt_slice, runs, GRAIN)
+        self._slices.call(lambda part: adapt(part, self._rules, self._last_fixes, self._learnt), runs, GRAIN)
         if self.adaptation.literal:
             failed = runs[~(self.ratio[runs] >= 0.0)]
             if len(failed):
                 run = int(failed[0])
                 raise negative_ratio(run, int(index[run]), float(time[index[run]]), float(self.ratio[run]))
-
-    def _adapt_slice(self, runs: Runs) -> None:
-        adaptation = self.adaptation
-        adapt(
-            runs,
-            self._covariance,
-            self._gamma,
-            self._nis,
-            self._weight,
-            adaptation.window,
-            adaptation.delay,
-            adaptation.frozen_above,
-            not adaptation.has("non-cumulative"),
-            adaptation.ratio_range,
-            adaptation.scale_range,
-            adaptation.noise_range,
-            self._initial,
-            self._residuals,
-            self._innovations,
-            self.count,
-            self.ratio,
-            self.noise,
-            self.scale,
-        )
 
 
 class SelfTuningBatch(FilterBatch):

@@ -15,7 +15,7 @@ from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.batch import Weights
 from spoofgym.navigation.error_model import NUM_NAVIGATION
-from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, PER_SATELLITE, POSITION
+from spoofgym.navigation.tight.states import CLOCK, DRIFT, NUM_COMMON, NUM_INERTIAL, PER_SATELLITE, POSITION
 
 FIRST_POSITION = POSITION.start
 """Place of the position's first state."""
@@ -110,7 +110,7 @@ def predict_error(
     """
     for i in range(NUM_NAVIGATION):
         work[i] = noise[i]
-    for j in range(columns.shape[0]):
+    for j in range(NUM_INERTIAL):
         factor = error[j]
         for i in range(NUM_NAVIGATION):
             work[i] += columns[j, i] * factor
@@ -144,7 +144,7 @@ def predict_covariance(
         covariance: P, (n, n), in place.
         work: (9, n).
     """
-    n, inertial = covariance.shape[0], transition.shape[1]
+    n = covariance.shape[0]
     for j in range(n):
         covariance[CLOCK, j] += interval * covariance[DRIFT, j]
     for i in range(n):
@@ -152,7 +152,7 @@ def predict_covariance(
     for i in range(NUM_NAVIGATION):
         for j in range(n):
             work[i, j] = 0.0
-        for k in range(inertial):
+        for k in range(NUM_INERTIAL):
             factor = transition[i, k]
             if factor != 0.0:
                 for j in range(n):
@@ -160,7 +160,7 @@ def predict_covariance(
     for i in range(NUM_NAVIGATION):
         for j in range(i + 1):
             total = process_noise[i, j]
-            for k in range(inertial):
+            for k in range(NUM_INERTIAL):
                 total += work[i, k] * transition[j, k]
             covariance[i, j] = total
             covariance[j, i] = total

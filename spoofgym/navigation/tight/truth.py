@@ -62,18 +62,17 @@ def error_work(steps: ErrorSteps) -> ErrorWork:
 @njit(cache=True, nogil=True, error_model="numpy")
 def draw_process_noise(k: int, steps: ErrorSteps, normals: Floats, noise: Floats) -> None:
     """The noise w that acts on a run's error up to epoch k, (n,), overwritten, from the epoch's normals (n,)."""
+    columns, sigma, clock = steps.noise_columns[k], steps.noise_sigma, steps.clock_factor
     for i in range(NUM_NAVIGATION):
         noise[i] = 0.0
     for j in range(NUM_NAVIGATION):
         factor = normals[j]
         for i in range(NUM_NAVIGATION):
-            noise[i] += steps.noise_columns[k, j, i] * factor
+            noise[i] += columns[j, i] * factor
     for i in range(NUM_NAVIGATION, noise.shape[0]):
-        noise[i] = steps.noise_sigma[i] * normals[i]
+        noise[i] = sigma[i] * normals[i]
     for i in range(2):
-        noise[CLOCK + i] = (
-            steps.clock_factor[i, 0] * normals[CLOCK] + steps.clock_factor[i, 1] * normals[CLOCK + 1]
-        )
+        noise[CLOCK + i] = clock[i, 0] * normals[CLOCK] + clock[i, 1] * normals[CLOCK + 1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -6,7 +6,7 @@
     python -m spoofgym.studies.reproduce song-2021
     python -m spoofgym.studies.reproduce kujur-2024
 
-The tables need `spoofgym[train]`.
+The argument names the paper.
 """
 
 from __future__ import annotations
@@ -16,14 +16,10 @@ import sys
 from collections.abc import Sequence
 
 from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number
+from spoofgym.console import console
 from spoofgym.program import do_all, give_json, program
 from spoofgym.studies.reproduce import foi_r_5687, kujur_2024, liu_2018, shadmehri_2025, song_2021
-
-try:
-    from spoofgym.console import console
-    from spoofgym.studies.reproduce.table import WIDTH, print_reproduction
-except ModuleNotFoundError as error:
-    raise SystemExit("the tables need rich: pip install 'spoofgym[train]'") from error
+from spoofgym.studies.reproduce.table import WIDTH, print_reproduction
 
 PAPERS = {module.PAPER: module.reproduce for module in (liu_2018, foi_r_5687, shadmehri_2025, song_2021, kujur_2024)}
 RUNS, QUICK_RUNS = 40, 4
