@@ -141,10 +141,12 @@ class Scenario(Immutable):
         Raises:
             ValueError: the filter takes fixes.
         """
-        model = self.facts.tight_model
+        model = self.facts.range_model
         if model is None:
             raise ValueError(f"scenario {self.name!r} is loosely coupled: it has a linear_model, not a tight_model")
-        return model(burn_in)
+        made = model(burn_in)
+        assert isinstance(made, TightModel)
+        return made
 
     def check_fidelity(self, fidelity: object) -> None:
         """Refuse a fidelity that the scenario does not have.

@@ -12,6 +12,7 @@ from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.navigation.separation.coasting import coasting_tables
 from spoofgym.navigation.separation.windows import CoastingWindows, OwnFilters, Separated
+from spoofgym.navigation.tight.model import TightModel
 from spoofgym.specification import spell
 
 DEFAULT_WINDOW = 60
@@ -103,9 +104,11 @@ class SeparationBank(ThresholdDetector):
 
     def know(self, facts: FilterFacts) -> None:
         """Compute what all windows share, along the scenario."""
-        assert facts.tight_model is not None
+        assert facts.range_model is not None
         burn_in = 0 if facts.matched else self.memory
-        self._tables = coasting_tables(facts.tight_model(burn_in), DIRECTIONS[self.direction], self.n, burn_in)
+        model = facts.range_model(burn_in)
+        assert isinstance(model, TightModel)
+        self._tables = coasting_tables(model, DIRECTIONS[self.direction], self.n, burn_in)
 
     def reset(self, runs: Runs) -> None:
         """Close the windows of these runs."""

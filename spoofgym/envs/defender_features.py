@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,14 +61,92 @@ def defender_fields(dimension: int, detectors: tuple[str, ...], error_scale: flo
     return tuple(result)
 
 
+class Seen(NamedTuple):
+    """What the monitors show of the present epoch; shapes as in `Innovation`.
+
+    Attributes:
+        epoch: its index, (N,).
+        whitened: innovation, (N, m).
+        residual: innovation, (N, m), m and m/s.
+        nis: (N,).
+        available: whether the receiver gives a fix, (N,).
+        ratios: each statistic over its threshold, (N, D).
+        depth: epochs since the estimated onset, (N,).
+        score: of this estimate, (N,).
+    """
+
+    epoch: Runs
+    whitened: Floats
+    residual: Floats
+    nis: Floats
+    available: Flags
+    ratios: Floats
+    depth: Runs
+    score: Floats
+
+
+class Told(NamedTuple):
+    """What the defender knows of itself and of its filter.
+
+    Attributes:
+        excluding: whether its last decision was to exclude, (N,).
+        coast: time without a fix that was used, (N,), s.
+        covariance: of the position, (N, 3, 3), m².
+        velocity: estimated, (N, 3), ENU, m/s.
+        bias: estimated, over the data sheet's, (N, 6).
+        interval: since the epoch before, (N,), s.
+        elapsed: share of the game that is over, (N,).
+    """
+
+    excluding: Flags
+    coast: Floats
+    covariance: Floats
+    velocity: Floats
+    bias: Floats
+    interval: Floats
+    elapsed: Floats
+
+
+class QuietBounds(NamedTuple):
+    """What a quiet fix stays below.
+
+    Attributes:
+        nis: bound of its NIS.
+        mean: bound of the squared signed mean.
+    """
+
+    nis: float
+    mean: float
+
+
+class Memory(NamedTuple):
+    """What is kept from epoch to epoch.
+
+    Attributes:
+        means: the last horizontal innovations, a ring, (N, 10, 2), sigma.
+        residual: horizontal innovation of the last fix, (N, 2), m.
+        velocity: estimated one epoch ago, (N, 3), m/s.
+        suspicion: whether a classical defender would exclude, (N,).
+        old_alarm: whether the alarm lasts on from before the suspicion was dropped, (N,).
+        quiet: fixes in a row that agree, under suspicion, (N,).
+        agreeing: fixes in a row that agree, in exclusion, (N,).
+    """
+
+    means: Floats
+    residual: Floats
+    velocity: Floats
+    suspicion: Flags
+    old_alarm: Flags
+    quiet: Runs
+    agreeing: Runs
+
+
 class DefenderFeatures:
     """The observations of N lanes.
 
     Attributes:
         fields: the entries, in order.
-        suspicion: whether a classical defender would exclude, (N,).
         onset_depth: epochs since the estimated onset, (N,).
-        agreeing: fixes in a row that agree with the coasting filter while the defender excludes, (N,).
     """
 
     def __init__(
@@ -85,16 +164,18 @@ class DefenderFeatures:
         self._detectors = tuple(detectors)
         self._thresholds = np.array([simulation.detectors[name].threshold for name in detectors])
         self._onset = OnsetEstimator(num_lanes)
-        self._means = np.zeros((num_lanes, LONG, 2))
-        self._residual = np.zeros((num_lanes, 2))
-        self._velocity = np.zeros((num_lanes, 3))
-        self.suspicion = np.zeros(num_lanes, dtype=bool)
+        self._memory = Memory(
+            np.zeros((num_lanes, LONG, 2)),
+            np.zeros((num_lanes, 2)),
+            np.zeros((num_lanes, 3)),
+            np.zeros(num_lanes, dtype=bool),
+            np.zeros(num_lanes, dtype=bool),
+            np.zeros(num_lanes, dtype=np.int64),
+            np.zeros(num_lanes, dtype=np.int64),
+        )
         self.onset_depth = np.zeros(num_lanes, dtype=np.int64)
-        self._old_alarm = np.zeros(num_lanes, dtype=bool)
-        self._quiet = np.zeros(num_lanes, dtype=np.int64)
-        self.agreeing = np.zeros(num_lanes, dtype=np.int64)
         self._raw = np.zeros((num_lanes, len(self.fields)))
-        self._quiet_nis, self._quiet_mean = quantile(QUIET_P, dimension), quantile(QUIET_P, 2)
+        self._quiet_bounds = QuietBounds(quantile(QUIET_P, dimension), quantile(QUIET_P, 2))
         self._timeline, self._horizon = scenario.timeline, scenario.timeline.num_epochs
         self._bias_sigma = scenario.bias_sigma
         self._squash = Squash(self.fields)
@@ -102,9 +183,20 @@ class DefenderFeatures:
     def reset(self, lanes: Runs) -> None:
         """Forget the games of these lanes."""
         self._onset.reset(lanes)
-        self._means[lanes], self._residual[lanes], self._velocity[lanes] = 0.0, 0.0, np.nan
-        self.suspicion[lanes], self._old_alarm[lanes] = False, False
-        self._quiet[lanes], self.agreeing[lanes] = 0, 0
+        memory = self._memory
+        memory.means[lanes], memory.residual[lanes], memory.velocity[lanes] = 0.0, 0.0, np.nan
+        memory.suspicion[lanes], memory.old_alarm[lanes] = False, False
+        memory.quiet[lanes], memory.agreeing[lanes] = 0, 0
+
+    @property
+    def suspicion(self) -> Flags:
+        """Whether a classical defender would exclude, (N,)."""
+        return self._memory.suspicion
+
+    @property
+    def agreeing(self) -> Runs:
+        """Fixes in a row that agree with the coasting filter while the defender excludes, (N,)."""
+        return self._memory.agreeing
 
     def update(self, excluding: Flags, coast: Runs, lanes: Runs) -> None:
         """See the present epoch of these lanes.
@@ -122,36 +214,26 @@ class DefenderFeatures:
         statistics = np.empty((len(coast), len(self._thresholds)))
         for place, name in enumerate(self._detectors):
             statistics[:, place] = epoch.statistics[name]
-        _fill(
-            lanes,
+        seen = Seen(
             epoch.index,
             epoch.innovation.whitened,
             epoch.innovation.residual,
             epoch.innovation.nis,
             epoch.available,
-            statistics,
-            self._thresholds,
+            statistics / self._thresholds,
             self.onset_depth,
             score,
+        )
+        told = Told(
             excluding,
             self._coasting_time(epoch.index, coast),
             epoch.view.position_covariance,
             epoch.view.velocity,
-            epoch.view.estimated_bias,
-            self._bias_sigma,
+            epoch.view.estimated_bias / self._bias_sigma,
             self._timeline.intervals[np.maximum(epoch.index - 1, 0)],
-            self._horizon,
-            self._quiet_nis,
-            self._quiet_mean,
-            self._means,
-            self._residual,
-            self._velocity,
-            self.suspicion,
-            self._old_alarm,
-            self._quiet,
-            self.agreeing,
-            self._raw,
+            epoch.index / self._horizon,
         )
+        _fill(lanes, seen, told, self._quiet_bounds, self._memory, self._raw)
         if self._ranges is not None:
             self._raw[lanes, self._common :] = self._ranges()[lanes]
 
@@ -168,76 +250,53 @@ class DefenderFeatures:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill(
-    lanes: Runs,
-    index: Runs,
-    whitened: Floats,
-    residual: Floats,
-    nis: Floats,
-    available: Flags,
-    statistics: Floats,
-    thresholds: Floats,
-    depth: Runs,
-    score: Floats,
-    excluding: Flags,
-    coast: Floats,
-    covariance: Floats,
-    velocity: Floats,
-    bias: Floats,
-    bias_sigma: Floats,
-    interval: Floats,
-    horizon: int,
-    quiet_nis: float,
-    quiet_mean: float,
-    means: Floats,
-    last_residual: Floats,
-    last_velocity: Floats,
-    suspicion: Flags,
-    old_alarm: Flags,
-    quiet: Runs,
-    agreeing: Runs,
-    raw: Floats,
-) -> None:
+def _fill(lanes: Runs, seen: Seen, told: Told, bounds: QuietBounds, memory: Memory, raw: Floats) -> None:
     """Write the raw entries of lanes, in the order of `defender_fields`, and keep what the next epoch compares with."""
-    m = whitened.shape[1]
+    m, detectors = seen.whitened.shape[1], seen.ratios.shape[1]
     for lane in lanes:
-        row = raw[lane]
+        row, first = raw[lane], seen.epoch[lane] == 0
         place = 0
         for a in range(m):
-            row[place + a] = whitened[lane, a]
+            row[place + a] = seen.whitened[lane, a]
         place += m
-        for d in range(len(thresholds)):
-            row[place + d] = statistics[lane, d] / thresholds[d]
-        place += len(thresholds)
-        square = _signed_means(means[lane], index[lane], whitened[lane], row[place : place + 4])
+        for d in range(detectors):
+            row[place + d] = seen.ratios[lane, d]
+        place += detectors
+        square = _signed_means(memory.means[lane], seen.epoch[lane], seen.whitened[lane], row[place : place + 4])
         place += 4
-        for a in range(2):
-            row[place + a] = residual[lane, a]
-            change = residual[lane, a] - last_residual[lane, a]
-            row[place + 2 + a] = change if available[lane] and index[lane] > 0 else 0.0
-            if available[lane]:
-                last_residual[lane, a] = residual[lane, a]
+        _changes(seen.residual[lane], memory.residual[lane], seen.available[lane], first, row[place : place + 4])
         place += 4
-        if not excluding[lane]:
-            agreeing[lane] = 0
-        elif available[lane]:
-            agreeing[lane] = agreeing[lane] + 1 if nis[lane] < quiet_nis else 0
-        if available[lane]:
-            _suspect(lane, square > quiet_mean, nis[lane] < quiet_nis, suspicion, old_alarm, quiet)
-        row[place] = depth[lane]
-        row[place + 1] = score[lane]
-        row[place + 2] = 1.0 if suspicion[lane] else 0.0
-        row[place + 3] = quiet[lane]
-        row[place + 4] = agreeing[lane]
-        row[place + 5] = 1.0 if available[lane] else 0.0
-        row[place + 6] = 1.0 if excluding[lane] else 0.0
-        row[place + 7] = coast[lane]
-        row[place + 8] = np.sqrt(covariance[lane, 0, 0] + covariance[lane, 1, 1])
-        _motion(velocity[lane], last_velocity[lane], index[lane] == 0, interval[lane], row[place + 9 : place + 11])
+        if not told.excluding[lane]:
+            memory.agreeing[lane] = 0
+        elif seen.available[lane]:
+            memory.agreeing[lane] = memory.agreeing[lane] + 1 if seen.nis[lane] < bounds.nis else 0
+        if seen.available[lane]:
+            _suspect(lane, square > bounds.mean, seen.nis[lane] < bounds.nis, memory)
+        row[place] = seen.depth[lane]
+        row[place + 1] = seen.score[lane]
+        row[place + 2] = 1.0 if memory.suspicion[lane] else 0.0
+        row[place + 3] = memory.quiet[lane]
+        row[place + 4] = memory.agreeing[lane]
+        row[place + 5] = 1.0 if seen.available[lane] else 0.0
+        row[place + 6] = 1.0 if told.excluding[lane] else 0.0
+        row[place + 7] = told.coast[lane]
+        row[place + 8] = np.sqrt(told.covariance[lane, 0, 0] + told.covariance[lane, 1, 1])
+        _motion(told.velocity[lane], memory.velocity[lane], first, told.interval[lane], row[place + 9 : place + 11])
         place += 11
         for a in range(6):
-            row[place + a] = bias[lane, a] / bias_sigma[a]
-        row[place + 6] = index[lane] / horizon
+            row[place + a] = told.bias[lane, a]
+        row[place + 6] = told.elapsed[lane]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _changes(residual: Floats, last: Floats, available: bool, first: bool, row: Floats) -> None:
+    """Write the horizontal innovation and its change since the last fix, (4,), m, and keep it, (2,)."""
+    for a in range(2):
+        row[a] = residual[a]
+        change = residual[a] - last[a]
+        row[2 + a] = change if available and not first else 0.0
+        if available:
+            last[a] = residual[a]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -276,12 +335,13 @@ def _signed_means(ring: Floats, index: int, whitened: Floats, row: Floats) -> fl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _suspect(lane: int, alarm: bool, agrees: bool, suspicion: Flags, old_alarm: Flags, quiet: Runs) -> None:
+def _suspect(lane: int, alarm: bool, agrees: bool, memory: Memory) -> None:
     """What a classical defender would believe: `spoofgym.responses.reuse.Consistent` after the alarm of a signed mean.
 
     An alarm raises the suspicion, five fixes in a row that agree drop it; an alarm that lasts on from before then does
     not raise it again.
     """
+    suspicion, old_alarm, quiet = memory.suspicion, memory.old_alarm, memory.quiet
     old_alarm[lane] = old_alarm[lane] and alarm and agrees
     if suspicion[lane]:
         quiet[lane] = quiet[lane] + 1 if agrees else 0

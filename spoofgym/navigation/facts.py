@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.tight.model import TightModel
 
 INERTIAL_SOLUTION = "inertial solution"
 LINEAR_MODEL = "linear model"
@@ -28,7 +27,7 @@ class FilterFacts:
         fix_sigma: 1 sigma of a fix per horizontal axis, m; None = not told.
         auxiliary_sigma: 1 sigma of what the odometer's solution goes wrong in an epoch at the end of the game, m; None
             = there is no odometer.
-        tight_model: burn-in -> the model of the tightly coupled filter, every range used; None = it takes fixes.
+        range_model: burn-in -> the model of a filter on ranges (`TightModel`), every range used; None = it takes fixes.
         matched: whether clean innovations before epoch 0 are drawn, white, as of epoch 0; else the filter has really
             been there.
     """
@@ -40,7 +39,7 @@ class FilterFacts:
     model: Callable[[int], LinearModel]
     fix_sigma: float | None = None
     auxiliary_sigma: float | None = None
-    tight_model: Callable[[int], TightModel] | None = None
+    range_model: Callable[[int], object] | None = None
     matched: bool = True
 
     def require(self, owner: str, needs: tuple[str, ...], remedy: str = "") -> None:

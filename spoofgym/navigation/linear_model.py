@@ -146,17 +146,9 @@ def error_dynamics(
     np.fill_diagonal(true_density[:NUM_NAVIGATION], true_noise_density(grade, true_position_random_walk))
     transition = np.empty((num_epochs, NUM_STATES, NUM_STATES))
     noise = np.empty((2, num_epochs, NUM_STATES, NUM_STATES))
-    _accumulate(
-        trajectory.attitude,
-        trajectory.velocity,
-        trajectory.position,
-        trajectory.specific_force,
-        1.0 / trajectory.rate,
-        samples,
-        np.stack([filter_density, true_density]) / trajectory.rate,
-        transition,
-        noise,
-    )
+    motion = Motion(trajectory.attitude, trajectory.velocity, trajectory.position, trajectory.specific_force)
+    densities = np.stack([filter_density, true_density]) / trajectory.rate
+    _accumulate(motion, 1.0 / trajectory.rate, samples, densities, transition, noise)
     ends = samples * np.arange(1, num_epochs + 1)
     observation = observation_matrices(trajectory, receiver, ends)
     return ErrorDynamics(transition, noise[0], noise[1, :, :NUM_NAVIGATION, :NUM_NAVIGATION], observation)
@@ -262,17 +254,18 @@ def semidefinite_factor(covariance: Floats) -> Floats:
     return factor
 
 
+class Motion(NamedTuple):
+    """A true motion at the rate of its inertial samples; shapes as in `Trajectory`."""
+
+    attitude: Floats
+    velocity: Floats
+    position: Floats
+    specific_force: Floats
+
+
 @njit(cache=True, nogil=True)
 def _accumulate(
-    attitude: Floats,
-    velocity: Floats,
-    position: Floats,
-    specific_force: Floats,
-    step: float,
-    samples: int,
-    densities: Floats,
-    transition: Floats,
-    noise: Floats,
+    motion: Motion, step: float, samples: int, densities: Floats, transition: Floats, noise: Floats
 ) -> None:
     """Multiply the transitions of the IMU samples of every epoch, and carry their noise to its end."""
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
@@ -285,12 +278,12 @@ def _accumulate(
         noise[0, epoch, :, :] = 0.0
         noise[1, epoch, :, :] = 0.0
         for i in range(epoch * samples, (epoch + 1) * samples):
-            middle[:, :] = 0.5 * (attitude[i] + attitude[i + 1])
+            middle[:, :] = 0.5 * (motion.attitude[i] + motion.attitude[i + 1])
             for a in range(3):
                 force[a] = 0.0
                 for b in range(3):
-                    force[a] += middle[a, b] * specific_force[i, b]
-            navigation_dynamics(velocity[i], position[i], force, dynamics)
+                    force[a] += middle[a, b] * motion.specific_force[i, b]
+            navigation_dynamics(motion.velocity[i], motion.position[i], force, dynamics)
             transition_matrix(dynamics, middle, step, one, work)
             for a in range(NUM_NAVIGATION):
                 for b in range(NUM_STATES):

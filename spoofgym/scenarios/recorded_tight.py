@@ -76,7 +76,7 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     @property
     def facts(self) -> FilterFacts:
         """What the designer of the filter knows."""
-        return replace(super().facts, tight_model=self.tight_model)
+        return replace(super().facts, range_model=self.tight_model)
 
     @cached_property
     def ranges(self) -> RangeEpochs:

@@ -94,7 +94,7 @@ class TightFamily(RangeFamily):
             self.bias_sigma,
             self.offers,
             self.linear_model,
-            tight_model=self.tight_model,
+            range_model=self.tight_model,
             matched=self.matched,
         )
 
