@@ -159,7 +159,9 @@ def test_a_game_that_is_drawn() -> None:
     env.close()
 
 
-@pytest.mark.parametrize("name", [SPOOFER, pytest.param(DEFENDER, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", [SPOOFER, pytest.param(DEFENDER, marks=[pytest.mark.slow, pytest.mark.xdist_group("default defender")])]
+)
 def test_a_pickled_environment_is_the_environment(name: str) -> None:
     """As Gymnasium tests its own environments, before the first game and after it."""
     env = gym.make(name)

@@ -21,7 +21,7 @@ ID = "spoofgym/Defender-v0"
 SHORT = "foi-drive:horizon=60"
 QUICK: dict[str, Any] = {"scenario": SHORT, "detectors": ("snapshot", "signed-mean:n=5,p_fa=1e-3")}
 RAMP = "ramp:2,onset=40"
-GAMES = 2500
+GAMES = 1000
 
 
 def make(**arguments: Any) -> DefenderEnv:
@@ -310,9 +310,10 @@ def test_a_frame_is_drawn() -> None:
 
 @pytest.mark.slow
 def test_a_sensible_classical_defender_beats_never_always_and_random() -> None:
-    """Mean error on 2500 common games of the drive and of the tactical flight, by far more than chance.
+    """Mean error on 1000 common games of the drive and of the tactical flight, by far more than chance.
 
     Paired over games, the classical defender is better by more than 5 standard errors (false failure below 1e-6).
+    On 400 games the least margin was 4.8 standard errors, so that 7.6 are expected here.
     """
     for scenario, depth in (("foi-drive", 20), ("liu-flight:horizon=250,imu=tactical", 50)):
         errors = {}

@@ -6,7 +6,13 @@ import pytest
 
 from tests.golden import store
 
-EPISODES = [(kind, name) for kind, episodes in store.KINDS.items() for name in episodes()]
+CALIBRATED = ("game defender default", "game alone Defender-v0")
+"""Episodes that calibrate the default detectors of a defender, which other tests do, too: one worker does it once."""
+EPISODES = [
+    pytest.param(kind, name, marks=[pytest.mark.xdist_group("default defender")] if name in CALIBRATED else [])
+    for kind, episodes in store.KINDS.items()
+    for name in episodes()
+]
 EXPECTED = cache(store.read)
 
 
