@@ -149,9 +149,18 @@ def carry_unaided(runs: Runs, index: Runs, transition_columns: Floats, auxiliary
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
-    """z = H x - deviation."""
+    """z = H x - deviation; H (m, h), x (n,), the others (m,)."""
+    observed = observation.shape[1]
+    if observed == NUM_NAVIGATION:
+        _observe(NUM_NAVIGATION, observation, state, deviation, residual)
+    else:
+        _observe(observed, observation, state, deviation, residual)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _observe(observed: int, observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
     for a in range(residual.shape[0]):
         total = -deviation[a]
-        for j in range(observation.shape[1]):
+        for j in range(observed):
             total += observation[a, j] * state[j]
         residual[a] = total
