@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import chi2
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
@@ -22,6 +23,11 @@ from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
 
 NUM_BIASES = 6
+LARGEST_NIS = 1.5
+"""Mean NIS of a clean run per degree of freedom above which the log is doubted. A filter whose model is right has
+1; the process noise of recorded scenarios is so generous that the logs by which it was chosen stay below 0.9."""
+CHANCE = 1e-6
+"""Probability that the mean NIS of a short log exceeds its limit although the model is right."""
 LOST_NIS = 100.0
 """NIS of one epoch per degree of freedom from which a filter that diverged was lost."""
 
@@ -65,6 +71,11 @@ class CleanRun:
         """Mean from an epoch on; about 1 where innovations are as large as the filter believes, 0 without any."""
         degrees = float(self.degrees[first:].sum())
         return float(self.nis[first:].sum()) / degrees if degrees > 0.0 else 0.0
+
+    def is_doubtful(self, first: int) -> bool:
+        """Whether innovations from an epoch on are larger than the filter believes, and not by chance."""
+        per_degree, degrees = self.nis_per_degree(first), float(self.degrees[first:].sum())
+        return bool(per_degree > LARGEST_NIS and per_degree * degrees > chi2.isf(CHANCE, degrees))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import chi2
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
@@ -31,11 +30,6 @@ MAX_IMU_GAP = 0.5
 """Longest time between inertial samples inside a game, s."""
 SETTLING = 30.0
 """Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
-LARGEST_NIS = 1.5
-"""Mean NIS of a clean run per degree of freedom above which the log is doubted. A filter whose model is right has
-1; the process noise of recorded scenarios is so generous that the logs by which it was chosen stay below 0.9."""
-CHANCE = 1e-6
-"""Probability that the mean NIS of a short log exceeds its limit although the model is right."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -300,20 +294,17 @@ class RecordedFamily(Immutable, ABC):
         """
         settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
         first = settled if settled < len(self.epoch_time) else 0
-        per_degree, degrees = run.nis_per_degree(first), float(run.degrees[first:].sum())
-        if per_degree > LARGEST_NIS and per_degree * degrees > chi2.isf(CHANCE, degrees):
+        if run.is_doubtful(first):
+            per_degree = run.nis_per_degree(first)
             worst = first + int(np.argmax(run.nis[first:]))
+            time = float(self.epoch_time[worst])
             warn(
                 self.log.folder,
                 f"clean innovations are {np.sqrt(per_degree):.1f} times as large as the filter believes: mean NIS "
                 f"{np.mean(run.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; "
-                f"the largest is {run.nis[worst]:.3g} at {self._place(worst)}; likely reasons: {self.doubts}",
+                f"the largest is {run.nis[worst]:.3g} at {seconds(time)} s"
+                f"{self.log.fixes.line(time)}; likely reasons: {self.doubts}",
             )
-
-    def _place(self, epoch: int) -> str:
-        """Where an epoch is in the log, for a message."""
-        time = float(self.epoch_time[epoch])
-        return f"{seconds(time)} s{self.log.fixes.line(time)}"
 
     @cached_property
     def true_position(self) -> Floats:

@@ -12,8 +12,8 @@ from spoofgym.logs.fix_rows import UNMEASURED_SIGMA
 from spoofgym.logs.log import velocity_of
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.facts import INERTIAL_SOLUTION
-from spoofgym.navigation.fixes import FixFamily
 from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.loose.fixes import FixFamily
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.loose.warm_start import ERROR, NUM_JOINT

@@ -35,6 +35,8 @@ CORNER = 0.5
 START_YAW = math.radians(248.0)
 """Along a long side, clockwise from north; the corners are right turns."""
 
+RATE = 1.0
+"""Of the fixes, Hz."""
 SIGMA = 0.59
 WHITE_SHARE = 0.15 / math.hypot(0.85, 0.15)
 """Of the receiver's sigma, where most of it is slow."""
@@ -101,6 +103,16 @@ PATHS: dict[str, tuple[Callable[[Floats, float], PlanarMotion], float]] = {
 """The motion and its speed, m/s, by ``data``."""
 
 
+def _receiver(noise: str, sigma: float) -> Receiver:
+    """A receiver whose fixes err by sigma per axis, m, with one of `NOISES`; the error of the height is white."""
+    if noise == "white":
+        return Receiver(rate=RATE, white_sigma=(sigma,) * 3, markov_sigma=(0.0,) * 3, markov_time=0.0)
+    white, slow = WHITE_SHARE * sigma, math.sqrt(1.0 - WHITE_SHARE**2) * sigma
+    return Receiver(
+        rate=RATE, white_sigma=(white, white, sigma), markov_sigma=(slow, slow, 0.0), markov_time=MARKOV_TIME
+    )
+
+
 def song_robot(
     data: str = "rectangle",
     noise: str = "markov",
@@ -144,9 +156,7 @@ def song_robot(
     )
     if auxiliary != "credited" and credit != 5:
         raise ValueError(f"{owner}: credit {credit} is of auxiliary 'credited', got auxiliary {auxiliary!r}")
-    white = sigma if noise == "white" else WHITE_SHARE * sigma
-    slow = 0.0 if noise == "white" else math.sqrt(1.0 - WHITE_SHARE**2) * sigma
-    encoders, receiver_rate = Odometer(), 1.0
+    encoders, receiver = Odometer(), _receiver(noise, sigma)
     name = spell(
         owner,
         data=None if data == "rectangle" else data,
@@ -158,15 +168,9 @@ def song_robot(
         horizon=None if horizon == 300 else horizon,
         onset=None if onset == 0.0 else onset,
     )
-    receiver = Receiver(
-        rate=receiver_rate,
-        white_sigma=(white, white, sigma),
-        markov_sigma=(slow, slow, 0.0),
-        markov_time=0.0 if noise == "white" else MARKOV_TIME,
-    )
     tuning = CredibleTuning(
         step=encoders.step,
-        samples=round(encoders.rate / receiver_rate),
+        samples=round(encoders.rate / RATE),
         acceleration=ACCELERATION * sigma,
         auxiliary_sigma=AUXILIARY * sigma,
         fix_sigma=sigma,

@@ -14,9 +14,9 @@ from spoofgym.navigation.credible.kalman import CredibleTuning, credible_linear_
 from spoofgym.navigation.credible.runs import AuxiliaryRule, CredibleModel, CredibleNavigator
 from spoofgym.navigation.credible.truth import PlanarTruth
 from spoofgym.navigation.facts import LINEAR_MODEL, ODOMETER, FilterFacts
-from spoofgym.navigation.fixes import FixFamily
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.linear_model import LinearModel
+from spoofgym.navigation.loose.fixes import FixFamily
 from spoofgym.navigation.loose.warm_start import COLOUR, NUM_JOINT
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.odometer import Odometer, OdometerGrade

@@ -12,11 +12,11 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.navigation.fixes import FixFamily
 from spoofgym.navigation.interface import Demands, Navigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
 from spoofgym.navigation.loose.adaptation import Adaptation
 from spoofgym.navigation.loose.adaptive import AdaptiveNavigator, AdaptiveStrapdownNavigator
+from spoofgym.navigation.loose.fixes import FixFamily
 from spoofgym.navigation.loose.own_gains import OwnCovarianceNavigator
 from spoofgym.navigation.loose.shared_gains import LinearNavigator
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
