@@ -12,7 +12,7 @@ The update is written in whitened form: with S = L L', U = P H' L⁻ᵀ and w = 
 which keeps P symmetric and uses one Cholesky factor for the gain, the test and the update. U is stored by columns, as
 U' (m, n), so that every inner loop runs along a row. Source: Bar-Shalom, Li and Kirubarajan 2001, ch. 5, rearranged.
 
-The short functions are compiled into their callers, since a call takes as long as their arithmetic. Functions that divide
+The short functions are compiled into their callers, since a call takes as long as their arithmetic. Those that divide
 are inlined by LLVM (``forceinline``) and not by numba: numba would let the caller decide what a division by zero does.
 """
 

@@ -99,7 +99,7 @@ class Held(NamedTuple):
     columns: Floats
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _carry_work(n: int) -> CarryWork:
     return CarryWork(
         np.empty(3),
@@ -152,7 +152,7 @@ def carry(
                 decay_biases(steps.decay, auxiliary[run])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _mechanize(
     k: int,
     motion: StrapdownSteps,
@@ -215,7 +215,7 @@ def _mechanize(
     return interval
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _carry_others(
     run: int,
     k: int,
@@ -264,7 +264,7 @@ def innovate(
         )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _add_geometry(k: int, sky: Sky, ranges: Ranges, solution: Solution, residual: Floats) -> None:
     """Add what errors of the inertial solution make of the predicted ranges, (m,): distances, or range rates."""
     slots, position = sky.satellites.shape[1], solution.position
