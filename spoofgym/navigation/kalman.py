@@ -87,7 +87,7 @@ def _predict_mean(width: int, transition: Floats, error: Floats, work: Floats) -
         error[i] = work[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def predict_covariance(transition: Floats, process_noise: Floats, covariance: Floats, work: Floats) -> None:
     """P <- Φ P Φ' + Q.
 
@@ -260,7 +260,7 @@ def whiten(factor: Floats, residual: Floats, whitened: Floats) -> float:
     return nis
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def update_covariance(gain: Floats, covariance: Floats) -> None:
     """P <- P - U U'; gain U' (m, n), covariance (n, n) in place.
 

@@ -77,7 +77,7 @@ class OwnCovarianceNavigator(ErrorBatch):
             ),
             self._all[: len(runs)],
         )
-        self._whitened[runs] = formed.whitened
+        self._whitened[self._where(runs)] = formed.whitened
         return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:

@@ -38,12 +38,12 @@ class TightNavigator(SharedGains, TightErrorBatch):
         _carry(runs, epochs, self.model.dynamics.error_steps, self._runs, auxiliary)
 
     def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
-        model, rows, deviation = self.model, self.index[runs], self._deviation
+        model, rows, deviation = self.model, self.index[self._where(runs)], self._deviation
         formed = empty_innovation(len(runs), model.dimension)
         self._on_slices(
             lambda part: _innovate(part, runs, model.gains, self._runs, deviation, formed), self._all[: len(runs)]
         )
-        self._whitened[runs] = formed.whitened
+        self._whitened[self._where(runs)] = formed.whitened
         return Innovation(
             formed.residual,
             at_epochs(model.innovation_covariance, rows),
