@@ -5,6 +5,9 @@ from __future__ import annotations
 import importlib.util
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 MISSING = "a figure needs matplotlib: pip install 'spoofgym[report]'"
 
 
@@ -32,3 +35,15 @@ def new_figure(width: float, height: float, **options: Any) -> Any:
     figure = Figure(figsize=(width, height), **options)
     FigureCanvasAgg(figure)
     return figure
+
+
+def pixels(figure: Any) -> NDArray[np.uint8]:
+    """A figure drawn, (H, W, 3), red, green and blue.
+
+    A copy of a figure has lost its canvas, so that it is given a new one.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
-from spoofgym.figures import new_figure
+from spoofgym.figures import new_figure, pixels
 from spoofgym.simulation import Simulation
 
 STATISTICS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -50,8 +50,7 @@ class GameFigure(ABC):
         """The figure so far, (540, 960, 3)."""
         self._figure.clear()
         self._draw(np.array(self._rows))
-        self._figure.canvas.draw()
-        return np.asarray(self._figure.canvas.buffer_rgba())[:, :, :3].copy()
+        return pixels(self._figure)
 
     @abstractmethod
     def _draw(self, rows: NDArray[np.float64]) -> None:

@@ -57,9 +57,9 @@ def test_the_control_delay_makes_the_ranges_of_the_wanted_place(advance):
 
     First order in an offset of 40 m and a spoofer 500 m away, with satellites 2e7 m away: a few centimetres.
     """
-    geometry = CARRIER.geometry
-    place = CARRIER.trajectory.position[[round(CARRIER.onset * CARRIER.trajectory.rate)]]
-    epoch = round(CARRIER.onset * CARRIER.rate) - 1
+    geometry = CARRIER.family.geometry
+    place = CARRIER.truth.trajectory.position[[round(CARRIER.truth.onset * CARRIER.truth.trajectory.rate)]]
+    epoch = round(CARRIER.truth.onset * CARRIER.truth.rate) - 1
     satellites, sight = geometry.position[epoch], geometry.line_of_sight[epoch]
     offset, spoofer, processing = np.array([30.0, -20.0, 15.0]), np.array([300.0, 380.0, -120.0]), 1e-6
 

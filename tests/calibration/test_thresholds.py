@@ -126,7 +126,7 @@ def scenario_of(factor, *, matched=True, num_epochs=120):
         dimension=len(factor),
         matched=matched,
         timeline=SimpleNamespace(num_epochs=num_epochs),
-        white_innovations=lambda: WhiteInnovations(factors),
+        family=SimpleNamespace(white_innovations=lambda: WhiteInnovations(factors)),
         facts=FilterFacts("stub", 1.0, np.ones(6), (), lambda burn_in: None),
     )
 

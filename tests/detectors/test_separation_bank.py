@@ -83,7 +83,7 @@ class Naive:
         seen none has σ_ss = 0; one unit in the last place of P_coast = 45 m² then makes 8e-8 m of it, on one processor
         and not on another, and δ allows √δ. Its |d| / σ_ss is a rounding error over √δ: within √ε, times a few.
         """
-        gain = self.navigator._gain * used[:, None, None]
+        gain = self.navigator._filters.gain * used[:, None, None]
         corrected = np.einsum("rmn,rm->rn", gain, whitened)
         after = self.navigator.covariance - np.einsum("rmi,rmj->rij", gain, gain)
         rounding = 2.0 * self.detector.n * after.shape[1] * np.finfo(float).eps

@@ -260,7 +260,7 @@ def test_a_policy_that_needs_a_shadow_filter_is_refused_on_a_log_without_a_linea
     def lacking(_: Any) -> Any:
         raise ValueError("scenario 'log' has no linear model")
 
-    monkeypatch.setattr(type(scenario), "linear_model", lacking)
+    monkeypatch.setattr(type(scenario.family), "linear_model", lacking)
     with pytest.raises(ValueError, match=r"'policy:.*' cannot play on scenario .*: scenario 'log' has no linear model"):
         Simulation(scenario, make_spoofer(text), fidelity="strapdown")
 

@@ -150,7 +150,7 @@ def test_the_filter_is_less_certain_without_a_satellite() -> None:
     for name in ("backtrack", "used", "left_out", "reward"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
     assert (one.backtrack[0], one.used[0]) == (10, False)
-    assert everyone.coast[0] == excluded.coast[0] == 1
+    assert everyone.seat.coast[0] == excluded.seat.coast[0] == 1
     np.testing.assert_array_equal(everyone.observation(), excluded.observation())
 
 

@@ -80,17 +80,18 @@ def test_the_shadow_is_the_victim_without_noise(sky: Any, under: Under) -> None:
     present = scenario.tight_model().dynamics.present
     assert sky in ((4.0, 5.0), "liu") or present.any(axis=0).sum() > present.all(axis=0).sum()
     played, victim = game(scenario, 1), SilentVictim(scenario)
-    shadow = played.shadow
+    shadow = played.seat.shadow
     assert isinstance(shadow, TightMeanFilter)
     victim.meet(np.zeros(4))
     for action in actions(40):
         played.step(action[None])
-        victim.meet(played.offset[0])
+        victim.meet(played.seat.offset[0])
         np.testing.assert_allclose(shadow.error[0], victim.navigator.state[0], rtol=1e-9, atol=1e-11)
         np.testing.assert_allclose(shadow.whitened[0], victim.whitened, rtol=1e-8, atol=1e-10)
         assert shadow.clock_error[0] == pytest.approx(victim.navigator.clock_error[0], rel=1e-9)
         if played.index[0] < 40:
-            np.testing.assert_allclose(shadow.coming[0], victim.would_meet(played.offset[0]), rtol=1e-8, atol=1e-10)
+            coming = victim.would_meet(played.seat.offset[0])
+            np.testing.assert_allclose(shadow.coming[0], coming, rtol=1e-8, atol=1e-10)
 
 
 def test_a_satellite_rises_into_a_slot_that_another_has_left(under: Under) -> None:
@@ -109,7 +110,7 @@ def test_the_shadow_is_the_mean_of_many_victims(sky: tuple[float, float], under:
     """Means of 2000 games against their standard error, 7 sigma each: false failure below 1e-9 in all."""
     lanes = 2000
     played = game(under(*sky), lanes, fidelity="linear")
-    shadow = played.shadow
+    shadow = played.seat.shadow
     assert isinstance(shadow, TightMeanFilter)
     tolerance = 7.0 / np.sqrt(lanes)
     for k, action in enumerate(actions(40) + np.array([0.3, -0.2, 0.0, 0.2]), start=1):
@@ -121,7 +122,7 @@ def test_the_shadow_is_the_mean_of_many_victims(sky: tuple[float, float], under:
     errors = played.simulation.error
     deviation = errors.mean(axis=0) - shadow.position_error[0]
     assert (np.abs(deviation) < tolerance * errors.std(axis=0)).all()
-    assert abs(played.clock_error.mean() - shadow.clock_error[0]) < tolerance * played.clock_error.std()
+    assert abs(played.seat.clock_error.mean() - shadow.clock_error[0]) < tolerance * played.seat.clock_error.std()
     assert np.hypot(*shadow.position_error[0, :2]) > 3.0 * tolerance * errors.std(axis=0).max()
 
 
@@ -129,12 +130,12 @@ def test_the_shadow_is_the_mean_of_many_victims(sky: tuple[float, float], under:
 def test_the_strapdown_victim_follows_the_shadow(scenario: str) -> None:
     """The nonlinear filter, spoofed minus clean on the same noise: within 1 % of what it is moved, and 2 cm."""
     spoofed, clean = (game(scenario, 1, fidelity="strapdown") for _ in range(2))
-    assert spoofed.shadow is not None
+    assert spoofed.seat.shadow is not None
     for action in actions(40):
         spoofed.step(action[None])
         clean.step(np.zeros((1, 4)))
     moved = (spoofed.simulation.error - clean.simulation.error)[0]
-    expected = spoofed.shadow.position_error[0]
+    expected = spoofed.seat.shadow.position_error[0]
     assert np.linalg.norm(moved - expected) < 0.01 * np.linalg.norm(expected) + 0.02
     assert np.linalg.norm(expected) > 1.0
 
@@ -147,8 +148,8 @@ def test_a_pull_of_the_clock_stays_in_the_clock(scenario: str) -> None:
         spoofed.step(0.5 * CLOCK_ALONE[None])
         clean.step(np.zeros((1, 4)))
     pulled = 40 * 0.5 * spoofed.scenario.clock_rate * spoofed.scenario.timeline.interval
-    assert spoofed.offset[0].tolist() == [0.0, 0.0, 0.0, pulled]
-    assert (spoofed.clock_error - clean.clock_error)[0] == pytest.approx(pulled, rel=1e-3)
+    assert spoofed.seat.offset[0].tolist() == [0.0, 0.0, 0.0, pulled]
+    assert (spoofed.seat.clock_error - clean.seat.clock_error)[0] == pytest.approx(pulled, rel=1e-3)
     moved = (spoofed.simulation.error - clean.simulation.error)[0]
     assert np.abs(moved).max() < 1e-3 * pulled
     assert spoofed.error[0] == pytest.approx(clean.error[0], abs=1e-3 * pulled)
@@ -168,7 +169,7 @@ def test_a_clock_that_is_pulled_fast_is_seen_and_slowly_is_not(scenario: str) ->
     for _ in range(40):
         outcome = slow.step(np.tile(0.01 * CLOCK_ALONE, (lanes, 1)))
     assert outcome.alarmed.sum() < 20
-    assert slow.offset[0, 3] == pytest.approx(0.4 * slow.scenario.clock_rate * slow.scenario.timeline.interval)
+    assert slow.seat.offset[0, 3] == pytest.approx(0.4 * slow.scenario.clock_rate * slow.scenario.timeline.interval)
 
 
 @pytest.mark.parametrize(("scenario", "second"), [(KUJUR, 2.0), (LIU, 4.0)])

@@ -8,6 +8,7 @@ import pytest
 
 from spoofgym.detectors import make_detector
 from spoofgym.envs.observation import spoofer_fields
+from spoofgym.evaluation import wrong_shadow as shadows
 from spoofgym.evaluation.trained_on import what_is_new
 from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
@@ -59,9 +60,9 @@ def test_what_is_new_is_told_once(folder, options, words, capsys):
 
 def test_a_wrong_shadow_is_new_by_design_but_another_victim_is_not(folder, capsys, monkeypatch):
     # each shadow takes an optimum of its own
-    monkeypatch.setattr(wrong_shadow, "SIGMA_FACTORS", (2.0,))
+    monkeypatch.setattr(shadows, "SIGMA_FACTORS", (2.0,))
     grades = {name: GRADES[name] for name in ("tactical", "navigation")}
-    monkeypatch.setattr(wrong_shadow, "GRADES", grades)
+    monkeypatch.setattr(shadows, "GRADES", grades)
     assert wrong_shadow.main(["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "4"]) == 0
     assert notes(capsys.readouterr().err) == []
     other = ["--scenario", "liu-flight:horizon=13", "--attacker", str(folder), "--episodes", "4", "--json", "-"]
