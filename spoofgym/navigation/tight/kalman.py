@@ -351,7 +351,7 @@ def leave_out(
             residual[a] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def form_innovation(
     place: int,
     k: int,
