@@ -293,14 +293,14 @@ def _add_geometry(k: int, sky: Sky, ranges: Ranges, solution: Solution, residual
 
 
 @njit(cache=True, nogil=True)
-def correct(runs: Runs, vehicles: Vehicles, filters: FilterRuns) -> None:
+def correct(runs: Runs, solution: Solution, state: Floats, filters: FilterRuns) -> None:
     """Add the correction -U w, minus the estimated error; P <- P - U U'."""
-    state = vehicles.errors.state
+    covariance, gain, _, whitened = filters
     correction = np.empty(state.shape[1])
     for run in runs:
         correction[:] = 0.0
-        tight_filter.correct_error(filters.gain[run], filters.whitened[run], correction)
-        feed_back(correction, solution_of(run, vehicles.solution))
+        tight_filter.correct_error(gain[run], whitened[run], correction)
+        feed_back(correction, solution_of(run, solution))
         for i in range(NUM_INERTIAL, state.shape[1]):
             state[run, i] += correction[i]
-        tight_filter.update_covariance(filters.gain[run], filters.covariance[run])
+        tight_filter.update_covariance(gain[run], covariance[run])

@@ -118,6 +118,7 @@ def _innovate(
 @njit(cache=True, nogil=True, error_model="numpy")
 def _correct(runs: Runs, state: Floats, filters: FilterRuns) -> None:
     """x <- x - U w, P <- P - U U'."""
+    covariance, gain, _, whitened = filters
     for run in runs:
-        tight_filter.correct_error(filters.gain[run], filters.whitened[run], state[run])
-        tight_filter.update_covariance(filters.gain[run], filters.covariance[run])
+        tight_filter.correct_error(gain[run], whitened[run], state[run])
+        tight_filter.update_covariance(gain[run], covariance[run])
