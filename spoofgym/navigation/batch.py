@@ -153,6 +153,10 @@ class FilterBatch(ABC):
         """The runs meant: all where none are named."""
         return self._all if runs is None else runs
 
+    def _where(self, runs: Runs) -> Runs | slice:
+        """Where runs stand in the arrays of all: a slice if all are meant, which NumPy copies a few times faster."""
+        return slice(None) if runs is self._all else runs
+
     def _on_slices(self, function: Callable[[Runs], object], runs: Runs) -> None:
         """Call a function on slices of runs, by threads."""
         self._slices.call(function, runs, self.grain)
@@ -188,7 +192,7 @@ class FilterBatch(ABC):
             runs: which, (n,).
         """
         runs = self._select(runs)
-        self._deviation[runs] = deviation
+        self._deviation[self._where(runs)] = deviation
         return self._form(runs, self._plain(len(runs)))
 
     def _plain(self, n: int) -> Weights:

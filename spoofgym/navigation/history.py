@@ -53,6 +53,7 @@ class History:
         self._past_covariance = np.zeros((num_runs, slots, packed_size(n)))
         self._states: dict[str, Any] = {}
         self._past: dict[str, Floats] = {}
+        self._ring: Ring | None = None
         self.add(**states)
 
     def add(self, **states: Any) -> None:
@@ -61,12 +62,18 @@ class History:
         for name, state in states.items():
             self._states[name] = state
             self._past[name] = np.zeros((num_runs, slots, math.prod(state.shape[1:])))
+        self._ring = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_ring": None}  # its views would become arrays of their own in a copy
 
     @property
     def ring(self) -> Ring:
         """The arrays without their inner axes, for `keep` and `restore`: one kernel serves every filter."""
-        flat = tuple(map(_flat, self._states.values()))
-        return Ring(flat, tuple(self._past.values()), self._covariance, self._past_covariance)
+        if self._ring is None:
+            flat = tuple(map(_flat, self._states.values()))
+            self._ring = Ring(flat, tuple(self._past.values()), self._covariance, self._past_covariance)
+        return self._ring
 
     def recall(self, name: str, epochs: Runs) -> Floats:
         """Values of one array of numbers after past epochs (N, E), (N, E, ...)."""

@@ -62,6 +62,7 @@ class MeanFilter(ABC):
         self.error = np.zeros((num_runs, num_states))
         self.whitened = np.zeros((num_runs, dimension))
         self.coming = np.zeros((num_runs, dimension))
+        self._means = Means(self.prior, self.error, self.whitened, self.coming)
         self._slices = slices
         self._all = np.arange(num_runs)
 
@@ -94,10 +95,8 @@ class MeanFilter(ABC):
             previous: offset of the epoch before, shaped like ``offset``.
             interval: time since that epoch, (N,), s.
         """
-        means = Means(self.prior, self.error, self.whitened, self.coming)
-        self._slices.call(
-            lambda part: self._advance(part, index, offset, previous, interval, means), self._all, self.grain
-        )
+        means, advance = self._means, self._advance
+        self._slices.call(lambda part: advance(part, index, offset, previous, interval, means), self._all, self.grain)
 
     @abstractmethod
     def _advance(

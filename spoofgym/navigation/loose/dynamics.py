@@ -119,7 +119,7 @@ class ErrorBatch(FilterBatch):
         return self.true_bias - self.state[:, BIAS]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def draw_process_noise(noise_columns: Floats, normals: Floats, noise: Floats) -> None:
     """Write the white noise that acts on a run's navigation states up to an epoch, from the epoch's normals (9,)."""
     for i in range(NUM_NAVIGATION):
@@ -130,7 +130,7 @@ def draw_process_noise(noise_columns: Floats, normals: Floats, noise: Floats) ->
             noise[i] += noise_columns[j, i] * factor
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def move_bias(step: Floats, true_bias: Floats, noise: Floats) -> None:
     """Let the biases of a run (6,) take a step (6,), which acts on their errors, too."""
     for a in range(6):
@@ -147,11 +147,20 @@ def carry_unaided(runs: Runs, index: Runs, transition_columns: Floats, auxiliary
         kalman.predict_error(columns, nothing, auxiliary[run], work)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def observe(observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
-    """z = H x - deviation."""
+    """z = H x - deviation; H (m, h), x (n,), the others (m,)."""
+    observed = observation.shape[1]
+    if observed == NUM_NAVIGATION:
+        _observe(NUM_NAVIGATION, observation, state, deviation, residual)
+    else:
+        _observe(observed, observation, state, deviation, residual)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _observe(observed: int, observation: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
     for a in range(residual.shape[0]):
         total = -deviation[a]
-        for j in range(observation.shape[1]):
+        for j in range(observed):
             total += observation[a, j] * state[j]
         residual[a] = total

@@ -54,7 +54,7 @@ def constant_noise(covariance: Floats, num_runs: int) -> FilterNoise:
     return FilterNoise(np.array(covariance)[None], np.zeros(num_runs, dtype=np.int64), np.ones(num_runs))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def form_innovation(
     covariance: Floats,
     observation: Floats,

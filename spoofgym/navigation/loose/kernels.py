@@ -186,7 +186,8 @@ def mechanize_part(
         The length of the part, s.
     """
     start, stop, taken = part
-    attitude, velocity, position, step = solution.attitude, solution.velocity, solution.position, samples.step
+    attitude, velocity, position, _ = solution
+    angular_rate, specific_force, step, true_noise = samples
     rate, force = np.empty(3), np.empty(3)
     middle_attitude, middle_velocity, middle_position = np.empty((3, 3)), np.empty(3), np.empty(3)
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
@@ -202,13 +203,13 @@ def mechanize_part(
         if i == taken:
             _keep_fix(solution, fix)
         for a in range(3):
-            rate[a] = samples.angular_rate[i, a] + residual_bias[a]
-            force[a] = samples.specific_force[i, a] + residual_bias[3 + a]
+            rate[a] = angular_rate[i, a] + residual_bias[a]
+            force[a] = specific_force[i, a] + residual_bias[3 + a]
         if noisy:
             for a in range(3):
                 drawn = NUM_SAMPLE_NOISES * (i - start) + a
-                rate[a] += white_sample(samples.true_noise[a], step[i], noise[drawn])
-                force[a] += white_sample(samples.true_noise[3 + a], step[i], noise[drawn + 3])
+                rate[a] += white_sample(true_noise[a], step[i], noise[drawn])
+                force[a] += white_sample(true_noise[3 + a], step[i], noise[drawn + 3])
         mechanize(attitude, velocity, position, rate, force, step[i], mean_force)
         interval += step[i]
     for a in range(3):

@@ -49,11 +49,12 @@ class LooseMeanFilter(MeanFilter):
         """
         super().__init__(num_runs, NUM_STATES, model.dimension, slices)
         self.model = model
+        self._arrays = mean_model(model)
 
     def _advance(
         self, runs: Runs, index: Runs, offset: Floats, previous: Floats, interval: Floats, means: Means
     ) -> None:
-        _advance(runs, index, offset, previous, interval, mean_model(self.model), means)
+        _advance(runs, index, offset, previous, interval, self._arrays, means)
 
     def offset_for(self, index: Runs, whitened: Floats) -> Floats:
         """The offset that causes a wanted mean innovation of the position: s = H e⁻ - L u, (N, 3), m ENU.
@@ -63,7 +64,7 @@ class LooseMeanFilter(MeanFilter):
             whitened: u, (N, 3).
         """
         offset = np.empty((len(index), 3))
-        _offset_for(index, whitened, mean_model(self.model), self.prior, offset)
+        _offset_for(index, whitened, self._arrays, self.prior, offset)
         return offset
 
 
@@ -82,7 +83,7 @@ def expected_sequence(model: LinearModel, offsets: Floats) -> tuple[Floats, Floa
     return whitened, error
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _observe(
     observation: Floats, error: Floats, offset: Floats, previous: Floats, interval: float, residual: Floats
 ) -> None:

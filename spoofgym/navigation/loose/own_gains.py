@@ -55,7 +55,9 @@ class OwnCovarianceNavigator(ErrorBatch):
         self._gain = np.zeros((num_runs, model.dimension, n))
         self._filters = FilterRuns(self.covariance, self._gain, self._deviation, self._whitened)
         self._noise = constant_noise(model.measurement_covariance, num_runs) if noise is None else noise
-        self.past = History(demands.history, self.covariance, state=self.state, true_bias=self.true_bias)
+        self.past = History(demands.history, self.covariance, state=self.state)
+        if self.bias_steps.shape[1]:  # else the true biases are constant
+            self.past.add(true_bias=self.true_bias)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0, with the filter's warm covariance."""
@@ -77,7 +79,7 @@ class OwnCovarianceNavigator(ErrorBatch):
             ),
             self._all[: len(runs)],
         )
-        self._whitened[runs] = formed.whitened
+        self._whitened[self._where(runs)] = formed.whitened
         return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:

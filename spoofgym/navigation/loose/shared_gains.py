@@ -47,7 +47,7 @@ class LinearNavigator(SharedGains, ErrorBatch):
 
     def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
         model, m = self.model, self.model.dimension
-        covariance = model.innovation_covariance[self.index[runs]]
+        covariance = model.innovation_covariance[self.index[self._where(runs)]]
         formed = InnovationArrays(np.empty((len(runs), m)), covariance, np.empty((len(runs), m)), np.empty(len(runs)))
         self._on_slices(
             lambda part: _innovate(
@@ -62,7 +62,7 @@ class LinearNavigator(SharedGains, ErrorBatch):
             ),
             self._all[: len(runs)],
         )
-        self._whitened[runs] = formed.whitened
+        self._whitened[self._where(runs)] = formed.whitened
         return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:

@@ -97,7 +97,8 @@ class StrapdownNavigator(InertialBatch):
         lost = self._lost(runs, formed.nis)
         if len(lost):
             blank(lost, *formed)
-        self._whitened[runs], self._residual[runs] = formed.whitened, formed.residual
+        where = self._where(runs)
+        self._whitened[where], self._residual[where] = formed.whitened, formed.residual
         return Innovation(*formed)
 
     def _correct(self, runs: Runs) -> None:

@@ -94,7 +94,7 @@ def workspace(ranges: Ranges, n: int) -> Workspace:
     return Workspace(np.empty((m, entries)), np.empty(m), np.empty((m, n)), np.empty((m, m)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def predict_error(
     columns: Floats, decay: Floats, interval: float, noise: Floats, error: Floats, work: Floats
 ) -> None:
@@ -307,7 +307,7 @@ def update_covariance(gain: Floats, covariance: Floats) -> None:
             covariance[j, i] = covariance[i, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def correct_error(gain: Floats, whitened: Floats, error: Floats) -> None:
     """x <- x - K z = x - U w; gain U' (m, n), whitened w (m,), error x (n,) in place."""
     for a in range(gain.shape[0]):
@@ -316,7 +316,7 @@ def correct_error(gain: Floats, whitened: Floats, error: Floats) -> None:
             error[i] -= gain[a, i] * factor
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def observe(columns: Runs, values: Floats, state: Floats, deviation: Floats, residual: Floats) -> None:
     """z = H x - deviation; columns and values of H (m, 9), state x (n,), the others (m,)."""
     for a in range(residual.shape[0]):
@@ -351,7 +351,7 @@ def leave_out(
             residual[a] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def form_innovation(
     place: int,
     k: int,

@@ -99,7 +99,7 @@ class Held(NamedTuple):
     columns: Floats
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _carry_work(n: int) -> CarryWork:
     return CarryWork(
         np.empty(3),
@@ -128,31 +128,36 @@ def carry(
     The states are kept before every epoch. The unaided solution minus the filter's, auxiliary (N, 15), is carried by
     the same Φ, or is none, (N, 0).
     """
-    errors = vehicles.errors
+    # named tuples are taken apart here: in the loop that would cost more than the equations
+    errors, inertial, fix, normals = vehicles
+    epoch, true_bias, true_noise, decay = errors.epoch, errors.true_bias, motion.samples.true_noise, steps.decay
+    all_covariance, remembers = ring.covariance, ring.past_covariance.shape[1] > 0
     n = errors.state.shape[1]
     work = _carry_work(n)
+    residual_bias = work.residual_bias
     held = Held(np.ones(n), np.zeros(n), np.zeros((2, 2)), np.zeros((NUM_INERTIAL, NUM_NAVIGATION)))
-    noisy = vehicles.normals.shape[2] > 0
-    last = vehicles.normals.shape[2] - NUM_EPOCH_NOISES
+    noisy = normals.shape[2] > 0
+    last = normals.shape[2] - NUM_EPOCH_NOISES
     for run in runs:
-        solution, covariance = solution_of(run, vehicles.solution), ring.covariance[run]
+        solution, covariance = solution_of(run, inertial), all_covariance[run]
         for _ in range(epochs[run]):
-            keep(run, errors.epoch[run] + 1, ring)
-            errors.epoch[run] += 1
-            k = errors.epoch[run]
-            drawn = vehicles.normals[run, k % vehicles.normals.shape[1]]
+            epoch[run] += 1
+            k = epoch[run]
+            if remembers:
+                keep(run, k, ring)
+            drawn = normals[run, k % normals.shape[1]]
             for a in range(6):
-                work.residual_bias[a] = errors.true_bias[run, a] - solution.bias[a]
-            vehicle = (solution, vehicles.fix[run], drawn)
+                residual_bias[a] = true_bias[run, a] - solution.bias[a]
+            vehicle = (solution, fix[run], drawn)
             interval = _mechanize(k, motion, steps, held, vehicle, covariance, auxiliary[run], work)
             if noisy:
-                disturb_position(solution.position, motion.samples.true_noise, np.sqrt(interval), drawn[last:])
+                disturb_position(solution.position, true_noise, np.sqrt(interval), drawn[last:])
             _carry_others(run, k, steps, error_steps, vehicles, covariance, held, work)
             if auxiliary.shape[1] > 0:
-                decay_biases(steps.decay, auxiliary[run])
+                decay_biases(decay, auxiliary[run])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _mechanize(
     k: int,
     motion: StrapdownSteps,
@@ -181,41 +186,47 @@ def _mechanize(
         The time from the epoch before, s.
     """
     solution, fix, drawn = vehicle
+    samples, bounds, density = motion.samples, motion.bounds, motion.filter_density
+    mean_force, residual_bias, navigation, transition, product, half_noise, _ = work
     begin, end = motion.places[k], motion.places[k + 1]
-    start, interval = motion.bounds[begin], 0.0
+    start, interval = bounds[begin], 0.0
     for part in range(begin, end):
-        first = motion.bounds[part]
+        first = bounds[part]
         length = mechanize_part(
-            (first, motion.bounds[part + 1], -1),
-            work.residual_bias,
+            (first, bounds[part + 1], -1),
+            residual_bias,
             drawn[NUM_SAMPLE_NOISES * (first - start) :],
-            motion.samples,
+            samples,
             solution,
             fix,
-            work.mean_force,
-            work.transition,
+            mean_force,
+            transition,
         )
         for i in range(NUM_NAVIGATION):
-            work.half_noise[i, i] = 0.5 * length * motion.filter_density[i]
-            covariance[i, i] += work.half_noise[i, i]
-        whole = part == end - 1
-        tight_filter.predict_covariance(
-            work.transition,
-            work.half_noise,
-            steps.decay if whole else held.decay,
-            steps.variance if whole else held.variance,
-            steps.clock_noise if whole else held.clock_noise,
-            steps.intervals[k] if whole else 0.0,
-            covariance,
-            work.product,
-        )
+            half_noise[i, i] = 0.5 * length * density[i]
+            covariance[i, i] += half_noise[i, i]
+        if part == end - 1:
+            tight_filter.predict_covariance(
+                transition,
+                half_noise,
+                steps.decay,
+                steps.variance,
+                steps.clock_noise,
+                steps.intervals[k],
+                covariance,
+                product,
+            )
+        else:
+            tight_filter.predict_covariance(
+                transition, half_noise, held.decay, held.variance, held.clock_noise, 0.0, covariance, product
+            )
         if auxiliary.shape[0] > 0:
-            kalman.predict_mean(work.transition, auxiliary, work.navigation)
+            kalman.predict_mean(transition, auxiliary, navigation)
         interval += length
     return interval
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _carry_others(
     run: int,
     k: int,
@@ -252,19 +263,19 @@ def innovate(
     formed: RangeInnovations,
 ) -> None:
     """Innovation of runs, predicted minus measured; outputs, except the gain, stand at the places of the runs."""
-    errors = vehicles.errors
-    work = tight_filter.workspace(ranges, errors.state.shape[1])
+    epoch, state, inertial = vehicles.errors.epoch, vehicles.errors.state, vehicles.solution
+    columns, values, residuals = ranges.columns, ranges.values, formed.residual
+    covariance, gain, deviation, _ = filters
+    work = tight_filter.workspace(ranges, state.shape[1])
     for place in places:
         run = runs[place]
-        k, residual = errors.epoch[run], formed.residual[place]
-        tight_filter.observe(ranges.columns, ranges.values[k], errors.state[run], filters.deviation[run], residual)
-        _add_geometry(k, sky, ranges, solution_of(run, vehicles.solution), residual)
-        tight_filter.form_innovation(
-            place, k, ranges, weights, filters.covariance[run], filters.gain[run], formed, work
-        )
+        k, residual = epoch[run], residuals[place]
+        tight_filter.observe(columns, values[k], state[run], deviation[run], residual)
+        _add_geometry(k, sky, ranges, solution_of(run, inertial), residual)
+        tight_filter.form_innovation(place, k, ranges, weights, covariance[run], gain[run], formed, work)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _add_geometry(k: int, sky: Sky, ranges: Ranges, solution: Solution, residual: Floats) -> None:
     """Add what errors of the inertial solution make of the predicted ranges, (m,): distances, or range rates."""
     slots, position = sky.satellites.shape[1], solution.position
@@ -282,14 +293,14 @@ def _add_geometry(k: int, sky: Sky, ranges: Ranges, solution: Solution, residual
 
 
 @njit(cache=True, nogil=True)
-def correct(runs: Runs, vehicles: Vehicles, filters: FilterRuns) -> None:
+def correct(runs: Runs, solution: Solution, state: Floats, filters: FilterRuns) -> None:
     """Add the correction -U w, minus the estimated error; P <- P - U U'."""
-    state = vehicles.errors.state
+    covariance, gain, _, whitened = filters
     correction = np.empty(state.shape[1])
     for run in runs:
         correction[:] = 0.0
-        tight_filter.correct_error(filters.gain[run], filters.whitened[run], correction)
-        feed_back(correction, solution_of(run, vehicles.solution))
+        tight_filter.correct_error(gain[run], whitened[run], correction)
+        feed_back(correction, solution_of(run, solution))
         for i in range(NUM_INERTIAL, state.shape[1]):
             state[run, i] += correction[i]
-        tight_filter.update_covariance(filters.gain[run], filters.covariance[run])
+        tight_filter.update_covariance(gain[run], covariance[run])

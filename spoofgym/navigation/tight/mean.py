@@ -60,17 +60,8 @@ class TightMeanFilter(MeanFilter):
         """
         super().__init__(num_runs, model.dynamics.num_states, 3, slices)
         self.model = model
-
-    @property
-    def clock_error(self) -> Floats:
-        """Mean error of the receiver's clock after the last ranges, (N,), m."""
-        return self.error[:, CLOCK]
-
-    def _advance(
-        self, runs: Runs, index: Runs, offset: Floats, previous: Floats, interval: Floats, means: Means
-    ) -> None:
-        model, dynamics = self.model, self.model.dynamics
-        arrays = MeanModel(
+        dynamics = model.dynamics
+        self._arrays = MeanModel(
             dynamics.transition_columns,
             dynamics.decay,
             dynamics.intervals,
@@ -82,7 +73,16 @@ class TightMeanFilter(MeanFilter):
             model.whitened_gain,
             model.position_response,
         )
-        _advance(runs, index, offset, previous, interval, arrays, means)
+
+    @property
+    def clock_error(self) -> Floats:
+        """Mean error of the receiver's clock after the last ranges, (N,), m."""
+        return self.error[:, CLOCK]
+
+    def _advance(
+        self, runs: Runs, index: Runs, offset: Floats, previous: Floats, interval: Floats, means: Means
+    ) -> None:
+        _advance(runs, index, offset, previous, interval, self._arrays, means)
 
     def offset_for(self, index: Runs, whitened: Floats) -> Floats:
         """Refused: there are more ranges than entries of an offset.

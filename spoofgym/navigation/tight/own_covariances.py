@@ -47,8 +47,9 @@ class TightOwnCovariances(FilterBatch):
         formed = empty_innovations(len(runs), dynamics.dimension)
         self._on_slices(lambda part: self._fill(part, runs, weights, formed), self._all[: len(runs)])
         self._check(runs, formed)
-        self._whitened[runs], self._response[runs] = formed.whitened, formed.response
-        present = np.tile(at_epochs(dynamics.present, self.index[runs]) & weights.satellites, (1, 2))
+        where = self._where(runs)
+        self._whitened[where], self._response[where] = formed.whitened, formed.response
+        present = np.tile(at_epochs(dynamics.present, self.index[where]) & weights.satellites, (1, 2))
         return Innovation(*formed, present)
 
     def _forget_position(self, runs: Runs, variance: Floats) -> Floats:

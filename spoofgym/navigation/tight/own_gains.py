@@ -84,11 +84,13 @@ def _carry(
 ) -> None:
     """Carry runs over so many epochs each: keep the states, x <- Φ x + w, P <- Φ P Φ' + Q."""
     work, product = error_work(error_steps), np.empty((NUM_NAVIGATION, errors.state.shape[1]))
+    epoch, covariance, remembers = errors.epoch, ring.covariance, ring.past_covariance.shape[1] > 0
     for run in runs:
         for _ in range(epochs[run]):
-            keep(run, errors.epoch[run] + 1, ring)
+            if remembers:
+                keep(run, epoch[run] + 1, ring)
             k = carry_error(run, error_steps, errors, auxiliary, work)
-            tight_filter.predict_filter(k, steps, ring.covariance[run], product)
+            tight_filter.predict_filter(k, steps, covariance[run], product)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -102,19 +104,21 @@ def _innovate(
     formed: RangeInnovations,
 ) -> None:
     """Innovation with each run's own S, and its whitened gain; outputs but the gain stand at the places of the runs."""
-    work = tight_filter.workspace(ranges, errors.state.shape[1])
+    epoch, state = errors.epoch, errors.state
+    columns, values, residuals = ranges.columns, ranges.values, formed.residual
+    covariance, gain, deviation, _ = filters
+    work = tight_filter.workspace(ranges, state.shape[1])
     for place in places:
         run = runs[place]
-        k, residual = errors.epoch[run], formed.residual[place]
-        tight_filter.observe(ranges.columns, ranges.values[k], errors.state[run], filters.deviation[run], residual)
-        tight_filter.form_innovation(
-            place, k, ranges, weights, filters.covariance[run], filters.gain[run], formed, work
-        )
+        k, residual = epoch[run], residuals[place]
+        tight_filter.observe(columns, values[k], state[run], deviation[run], residual)
+        tight_filter.form_innovation(place, k, ranges, weights, covariance[run], gain[run], formed, work)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _correct(runs: Runs, state: Floats, filters: FilterRuns) -> None:
     """x <- x - U w, P <- P - U U'."""
+    covariance, gain, _, whitened = filters
     for run in runs:
-        tight_filter.correct_error(filters.gain[run], filters.whitened[run], state[run])
-        tight_filter.update_covariance(filters.gain[run], filters.covariance[run])
+        tight_filter.correct_error(gain[run], whitened[run], state[run])
+        tight_filter.update_covariance(gain[run], covariance[run])

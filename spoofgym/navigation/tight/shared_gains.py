@@ -38,12 +38,12 @@ class TightNavigator(SharedGains, TightErrorBatch):
         _carry(runs, epochs, self.model.dynamics.error_steps, self._runs, auxiliary)
 
     def _innovate(self, runs: Runs, weights: Weights) -> Innovation:
-        model, rows, deviation = self.model, self.index[runs], self._deviation
+        model, rows, deviation = self.model, self.index[self._where(runs)], self._deviation
         formed = empty_innovation(len(runs), model.dimension)
         self._on_slices(
             lambda part: _innovate(part, runs, model.gains, self._runs, deviation, formed), self._all[: len(runs)]
         )
-        self._whitened[runs] = formed.whitened
+        self._whitened[self._where(runs)] = formed.whitened
         return Innovation(
             formed.residual,
             at_epochs(model.innovation_covariance, rows),
@@ -86,15 +86,20 @@ def _innovate(
     places: Runs, runs: Runs, gains: TightGains, errors: ErrorRuns, deviation: Floats, formed: InnovationArrays
 ) -> None:
     """Innovation with shared S; outputs stand at the places of the runs."""
+    # named tuples are taken apart here: in the loop that would cost more than the equations
+    columns, values, factor = gains.columns, gains.values, gains.innovation_factor
+    epoch, state = errors.epoch, errors.state
+    residual, whitened, nis = formed.residual, formed.whitened, formed.nis
     for place in places:
         run = runs[place]
-        k, residual = errors.epoch[run], formed.residual[place]
-        tight_filter.observe(gains.columns, gains.values[k], errors.state[run], deviation[run], residual)
-        formed.nis[place] = kalman.whiten(gains.innovation_factor[k], residual, formed.whitened[place])
+        k = epoch[run]
+        tight_filter.observe(columns, values[k], state[run], deviation[run], residual[place])
+        nis[place] = kalman.whiten(factor[k], residual[place], whitened[place])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _correct(runs: Runs, gains: TightGains, errors: ErrorRuns, whitened: Floats) -> None:
     """x <- x - U w."""
+    epoch, state, gain = errors.epoch, errors.state, gains.whitened_gain
     for run in runs:
-        tight_filter.correct_error(gains.whitened_gain[errors.epoch[run]], whitened[run], errors.state[run])
+        tight_filter.correct_error(gain[epoch[run]], whitened[run], state[run])

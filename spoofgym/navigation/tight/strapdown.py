@@ -127,7 +127,7 @@ class TightStrapdownNavigator(TightOwnCovariances, InertialBatch):
             formed.response[lost] = 0.0
 
     def _correct(self, runs: Runs) -> None:
-        self._on_slices(lambda part: kernels.correct(part, self._vehicles, self._filters), runs)
+        self._on_slices(lambda part: kernels.correct(part, self._inertial, self.state, self._filters), runs)
 
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
         """The position jumps to where the ranges ask for it; its correlations are forgotten."""

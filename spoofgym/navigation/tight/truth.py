@@ -59,7 +59,7 @@ def error_work(steps: ErrorSteps) -> ErrorWork:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def draw_process_noise(k: int, steps: ErrorSteps, normals: Floats, noise: Floats) -> None:
     """The noise w that acts on a run's error up to epoch k, (n,), overwritten, from the epoch's normals (n,)."""
     columns, sigma, clock = steps.noise_columns[k], steps.noise_sigma, steps.clock_factor
@@ -75,7 +75,7 @@ def draw_process_noise(k: int, steps: ErrorSteps, normals: Floats, noise: Floats
         noise[CLOCK + i] = clock[i, 0] * normals[CLOCK] + clock[i, 1] * normals[CLOCK + 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def start_satellites(started: Flags, sigma: Floats, normals: Floats, state: Floats) -> None:
     """A new satellite's states are not known yet: their error is minus their true value, drawn from the prior.
 
@@ -92,14 +92,14 @@ def start_satellites(started: Flags, sigma: Floats, normals: Floats, state: Floa
                 state[place] = sigma[a] * normals[place]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def drift_biases(decay: Floats, noise: Floats, true_bias: Floats) -> None:
     """Carry the true biases (6,), in place, over an epoch; decay (n,) and noise w (n,)."""
     for a in range(true_bias.shape[0]):
         true_bias[a] = decay[NUM_NAVIGATION + a] * true_bias[a] + noise[NUM_NAVIGATION + a]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def carry_error(run: int, steps: ErrorSteps, errors: ErrorRuns, auxiliary: Floats, work: ErrorWork) -> int:
     """Carry one run to its next epoch; returns the epoch.
 
@@ -125,7 +125,7 @@ def carry_error(run: int, steps: ErrorSteps, errors: ErrorRuns, auxiliary: Float
     return k
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def decay_biases(decay: Floats, auxiliary: Floats) -> None:
     """Let the biases of the unaided solution minus the filter's, (15,), in place, decay over an epoch; decay (n,)."""
     for i in range(NUM_NAVIGATION, auxiliary.shape[0]):
