@@ -9,8 +9,8 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.batch import FilterBatch
-from spoofgym.navigation.error_model import BIAS, INERTIAL, NUM_NAVIGATION, POSITION, VELOCITY
+from spoofgym.navigation.error_batch import LinearErrorBatch
+from spoofgym.navigation.error_model import INERTIAL, NUM_NAVIGATION
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
@@ -29,15 +29,13 @@ class ErrorRuns(NamedTuple):
     bias_steps: Floats
 
 
-class ErrorBatch(FilterBatch):
+class ErrorBatch(LinearErrorBatch):
     """N runs of the true error under a linear filter.
 
     Attributes:
         model: the game.
-        state: the true error of all states, (N, n).
         normals: standard normal process noise of the episode, (N, K+1, 9); write into it to inject a noise path.
         bias_steps: changes of the biases at each epoch, (N, K+1, 6); shape (N, 0, 6) where they are constant.
-        true_bias: gyro and accelerometer biases, (N, 6), rad/s and m/s².
     """
 
     def __init__(
@@ -59,14 +57,12 @@ class ErrorBatch(FilterBatch):
             slices: the threads to use.
             demands: of the players.
         """
-        super().__init__(num_runs, model.dimension, slices, demands)
+        super().__init__(model.num_states, num_runs, model.dimension, slices, demands)
         epochs = model.num_epochs + 1
         self.model = model
-        self.state = np.zeros((num_runs, model.num_states))
         self.normals = np.zeros((num_runs, epochs, NUM_NAVIGATION))
         unstable = bool(np.any(grade.instability_sigma))
         self.bias_steps = np.zeros((num_runs, epochs if unstable else 0, 6))
-        self.true_bias = np.zeros((num_runs, 6))
         self._decay = float(np.exp(-interval / grade.correlation_time))
         self._instability = grade.instability_sigma
         self._runs = ErrorRuns(self.index, self.state, self.true_bias, self.normals, self.bias_steps)
@@ -96,27 +92,6 @@ class ErrorBatch(FilterBatch):
             following = self._decay * value + driving * normals[:, k]
             self.bias_steps[runs, k] = following - value
             value = following
-
-    def _solution(self, runs: Runs) -> tuple[Floats, ...]:
-        return (self.state[runs, INERTIAL],)
-
-    def _moved(self, before: tuple[Floats, ...], after: tuple[Floats, ...]) -> Floats:
-        return before[0] - after[0]
-
-    @property
-    def error(self) -> Floats:
-        """Estimate minus truth, (N, 3), m ENU."""
-        return self.state[:, POSITION].copy()
-
-    @property
-    def velocity_error(self) -> Floats:
-        """Estimate minus truth, (N, 3), m/s ENU."""
-        return self.state[:, VELOCITY].copy()
-
-    @property
-    def estimated_bias(self) -> Floats:
-        """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
-        return self.true_bias - self.state[:, BIAS]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats, Runs
-from spoofgym.navigation.batch import FilterBatch
+from spoofgym.navigation.error_batch import LinearErrorBatch
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.tight.model import TightModel
-from spoofgym.navigation.tight.states import BIAS, CLOCK, INERTIAL, POSITION, VELOCITY
+from spoofgym.navigation.tight.states import BIAS, CLOCK
 from spoofgym.navigation.tight.truth import ErrorRuns
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
@@ -19,15 +19,13 @@ from spoofgym.streams import RunStreams
 Kind = TypeVar("Kind", np.float64, np.bool_)
 
 
-class TightErrorBatch(FilterBatch):
+class TightErrorBatch(LinearErrorBatch):
     """N runs of the true error under a linear filter on ranges.
 
     Attributes:
         model: the game.
-        state: the true error of all states, (N, n).
         normals: standard normals of the episode, (N, K+1, n): process noise, or the true values of a new satellite's
             states; write into it to inject a noise path.
-        true_bias: gyro and accelerometer biases, (N, 6), rad/s and m/s².
     """
 
     def __init__(self, model: TightModel, num_runs: int, slices: RunSlices, demands: Demands) -> None:
@@ -39,12 +37,10 @@ class TightErrorBatch(FilterBatch):
             slices: the threads to use.
             demands: of the players.
         """
-        super().__init__(num_runs, model.dimension, slices, demands, model.dynamics.num_slots)
         n = model.dynamics.num_states
+        super().__init__(n, num_runs, model.dimension, slices, demands, model.dynamics.num_slots)
         self.model = model
-        self.state = np.zeros((num_runs, n))
         self.normals = np.zeros((num_runs, model.num_epochs + 1, n))
-        self.true_bias = np.zeros((num_runs, 6))
         self._runs = ErrorRuns(self.index, self.state, self.true_bias, self.normals)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
@@ -62,31 +58,10 @@ class TightErrorBatch(FilterBatch):
         for run in runs.tolist():
             streams(run, "imu").standard_normal(out=self.normals[run])
 
-    def _solution(self, runs: Runs) -> tuple[Floats, ...]:
-        return (self.state[runs, INERTIAL],)
-
-    def _moved(self, before: tuple[Floats, ...], after: tuple[Floats, ...]) -> Floats:
-        return before[0] - after[0]
-
-    @property
-    def error(self) -> Floats:
-        """Estimate minus truth, (N, 3), m ENU."""
-        return self.state[:, POSITION].copy()
-
-    @property
-    def velocity_error(self) -> Floats:
-        """Estimate minus truth, (N, 3), m/s ENU."""
-        return self.state[:, VELOCITY].copy()
-
     @property
     def clock_error(self) -> Floats:
         """Estimate minus truth of the receiver's clock, (N,), m."""
         return self.state[:, CLOCK].copy()
-
-    @property
-    def estimated_bias(self) -> Floats:
-        """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
-        return self.true_bias - self.state[:, BIAS]
 
 
 def at_epochs(table: NDArray[Kind], rows: Runs) -> NDArray[Kind]:
