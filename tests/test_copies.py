@@ -88,14 +88,15 @@ def check_no_views(root: object) -> None:
 
 
 def arrays_in(part: Any, seen: set[int]) -> Iterator[np.ndarray]:
-    """The arrays in an object and in all that it holds, but for what is never written."""
+    """The arrays in an object and in all of it that a copy takes, but for what is never written."""
     if id(part) in seen or isinstance(part, Immutable | RunSlices):
         return
     seen.add(id(part))
     if isinstance(part, np.ndarray):
         yield part
         return
-    inner = list(part) if isinstance(part, list | tuple | set) else list(getattr(part, "__dict__", {}).values())
+    own = part.__getstate__() if "__getstate__" in vars(type(part)) else getattr(part, "__dict__", {})
+    inner = list(part) if isinstance(part, list | tuple | set) else list((own or {}).values())
     for item in [*inner, *(part.values() if isinstance(part, dict) else ())]:
         yield from arrays_in(item, seen)
 

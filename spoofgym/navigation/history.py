@@ -53,7 +53,6 @@ class History:
         self._past_covariance = np.zeros((num_runs, slots, packed_size(n)))
         self._states: dict[str, Any] = {}
         self._past: dict[str, Floats] = {}
-        self._ring: Ring | None = None
         self.add(**states)
 
     def add(self, **states: Any) -> None:
@@ -62,17 +61,23 @@ class History:
         for name, state in states.items():
             self._states[name] = state
             self._past[name] = np.zeros((num_runs, slots, math.prod(state.shape[1:])))
-        self._ring = None
+        self._ring = self._flattened()
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_ring": None}  # its views would become arrays of their own in a copy
+        # its views would become arrays of their own in a copy
+        return {name: value for name, value in self.__dict__.items() if name != "_ring"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._ring = self._flattened()
+
+    def _flattened(self) -> Ring:
+        flat = tuple(map(_flat, self._states.values()))
+        return Ring(flat, tuple(self._past.values()), self._covariance, self._past_covariance)
 
     @property
     def ring(self) -> Ring:
         """The arrays without their inner axes, for `keep` and `restore`: one kernel serves every filter."""
-        if self._ring is None:
-            flat = tuple(map(_flat, self._states.values()))
-            self._ring = Ring(flat, tuple(self._past.values()), self._covariance, self._past_covariance)
         return self._ring
 
     def recall(self, name: str, epochs: Runs) -> Floats:
