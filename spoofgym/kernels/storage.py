@@ -1,7 +1,8 @@
 """Compiled code on disk: a file for each kernel, signature and processor, named by what the code is made of.
 
-A file is written in one step and never changed, and holds a digest of its content. So several processes may compile at
-once, and a damaged file is as if it were not there. Nothing that happens to the files stops a program: it compiles.
+A file is written in one step and never changed, and holds a digest of its content, so a damaged file is as if it were
+not there. Of several processes that need a kernel at the same time one compiles it (`turns`). Nothing that happens to
+the files stops a program: it compiles.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
+from spoofgym.kernels import turns
 from spoofgym.kernels.identity import identity, variant
 from spoofgym.kernels.place import place
 
@@ -49,18 +51,20 @@ class KernelStorage(_Cache):
         # as numba's own cache does before it asks for the processor
         target_context.refresh()
         file = self._file(sig, target_context.codegen())
-        content = None if file is None else _read(file)
+        content = None if file is None else _read(file) or turns.take(file, lambda: _read(file))
         return None if content is None else CompileResult._rebuild(target_context, *pickle.loads(content))
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code for a signature, unless it holds addresses of this process."""
         file = self._file(sig, data.codegen)
-        if file is None or data.lifted or data.library.has_dynamic_globals:
+        if file is None:
             return
         with suppress(OSError):
-            _write(file, dumps(data._reduce()))
-            self._remove_others(file)
-            _remove_unused(file.parent)
+            if not (data.lifted or data.library.has_dynamic_globals):
+                _write(file, dumps(data._reduce()))
+                self._remove_others(file)
+                _remove_unused(file.parent)
+        turns.end(file)
 
     def enable(self) -> None:
         """Load and save from now on."""
@@ -123,5 +127,5 @@ def _remove_unused(folder: Path) -> None:
     oldest = time.time() - UNUSED
     for file in folder.parent.glob("*/*"):
         with suppress(OSError):
-            if file.suffix in (SUFFIX, ".draft") and file.stat().st_mtime < oldest:
+            if file.suffix in (SUFFIX, turns.SUFFIX, ".draft") and file.stat().st_mtime < oldest:
                 file.unlink()
