@@ -18,8 +18,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from spoofgym.attacks.base import KNOWLEDGE
 from spoofgym.command_line import STDOUT, Parser, add_json, count, learner_seed, run_folder
-from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig
+from spoofgym.envs.config import ACTIONS, SpooferConfig
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.learning import spoofer
 from spoofgym.learning.ppo import Settings

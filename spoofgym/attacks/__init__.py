@@ -30,26 +30,31 @@ from spoofgym.attacks.song_mix import SongMix
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
 from spoofgym.specification import build, unnest
 
-
-def _inside(owner: str, attack: str) -> Attack:
-    """The attack within another one, spelled with ``/`` in place of its commas."""
-    with validation.argument(owner, "attack"):
-        return make_attack(unnest(attack))
+Inside = Callable[[str], Attack]
+"""Makes the attack within another one from its nested specification: ``/`` stands for its commas, ``~`` for ``+``."""
 
 
-def _tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> TrackingError:
-    """The tracking error around an attack that is spelled with ``/`` in place of its commas."""
-    return TrackingError(_inside("tracking-error", attack), sigma, time, axis)
+def _nested(attack: str) -> Attack:
+    return make_attack(unnest(attack))
 
 
-def _position_only(attack: str) -> PositionOnly:
-    """The attack spelled with ``/`` in place of its commas, with a velocity that stays true."""
-    return PositionOnly(_inside("position-only", attack))
+def _around(make: Inside) -> dict[str, Callable[..., Attack]]:
+    """The attacks that wrap another attack, which ``make`` makes."""
 
+    def inside(owner: str, attack: str) -> Attack:
+        with validation.argument(owner, "attack"):
+            return make(attack)
 
-def _partial(attack: str, satellites: int | None = None, numbers: str | None = None) -> Partial:
-    """The attack spelled with ``/`` in place of its commas, on a part of the satellites."""
-    return Partial(_inside("partial", attack), satellites, numbers)
+    def tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> Attack:
+        return TrackingError(inside("tracking-error", attack), sigma, time, axis)
+
+    def position_only(attack: str) -> Attack:
+        return PositionOnly(inside("position-only", attack))
+
+    def partial(attack: str, satellites: int | None = None, numbers: str | None = None) -> Attack:
+        return Partial(inside("partial", attack), satellites, numbers)
+
+    return {"tracking-error": tracking_error, "position-only": position_only, "partial": partial}
 
 
 ATTACKS: dict[str, Callable[..., Attack]] = {
@@ -75,16 +80,18 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "decaying-jump": DecayingJump,
     "climbing-spiral": ClimbingSpiral,
     **POPULATIONS,
-    "tracking-error": _tracking_error,
-    "position-only": _position_only,
-    "partial": _partial,
+    **_around(_nested),
 }
 
 
-def make_attack(attack: str | Attack) -> Attack:
+def make_attack(attack: str | Attack, inside: Inside = _nested) -> Attack:
     """The attack that a specification names; an object is returned as it is.
+
+    Args:
+        attack: a specification or an object.
+        inside: makes the attack within one that wraps another; by default from the attacks named here.
 
     Raises:
         ValueError: unknown name or option, or a value that does not fit; the message lists the valid ones.
     """
-    return attack if isinstance(attack, Attack) else build(attack, ATTACKS, "attack")
+    return attack if isinstance(attack, Attack) else build(attack, ATTACKS | _around(inside), "attack")

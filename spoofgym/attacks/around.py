@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
@@ -28,6 +30,9 @@ class AroundAttack(Attack):
         self.needs_model = attack.needs_model
         self.needs_velocity = attack.needs_velocity
         self.needs_ranges = attack.needs_ranges
+        self.closed_loop = attack.closed_loop
+        self.knowledge = attack.knowledge
+        self.has_tracking_error = attack.has_tracking_error
 
     def bind(self, timeline: Timeline, num_runs: int) -> None:
         """Fit the attack inside to a game.
@@ -54,6 +59,14 @@ class AroundAttack(Attack):
             ValueError: it is to capture one that is not among them.
         """
         self.attack.meet(satellites)
+
+    def join(self, simulation: Any) -> None:
+        """Give the attack inside the simulation that it plays in.
+
+        Raises:
+            ValueError: it needs what the simulation does not offer.
+        """
+        self.attack.join(simulation)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Start new episodes of the attack inside."""

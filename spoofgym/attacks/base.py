@@ -14,6 +14,9 @@ from spoofgym.streams import RunStreams
 from spoofgym.timeline import Timeline
 from spoofgym.validation import written
 
+KNOWLEDGE = ("blind", "shadow", "full")
+"""What a spoofer may see while it plays: its own offsets; a shadow filter; the victim's innovations and statistics."""
+
 
 class Attack(ABC):
     """What a spoofer adds to the fixes of N runs.
@@ -27,6 +30,8 @@ class Attack(ABC):
         needs_velocity: whether the receiver must give velocity, too.
         needs_ranges: whether the filter must take ranges.
         closed_loop: whether its offsets depend on what happens in the game, so that they cannot be told in advance.
+        knowledge: what it sees while it plays, one of `KNOWLEDGE`.
+        has_tracking_error: whether its offsets hold the error with which its spoofer tracks the vehicle.
     """
 
     onset: float | None = None
@@ -34,6 +39,8 @@ class Attack(ABC):
     needs_velocity: bool = False
     needs_ranges: bool = False
     closed_loop: bool = False
+    knowledge: str = "blind"
+    has_tracking_error: bool = False
 
     @property
     @abstractmethod

@@ -9,7 +9,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.attacks.base import Attack
+from spoofgym.attacks.base import KNOWLEDGE, Attack
 from spoofgym.attacks.families import (
     DEFAULT_MANOEUVRE,
     ClimbingSpiral,
@@ -57,6 +57,8 @@ class AttackPool(Attack):
         self.clean = validation.share("pool of attacks", "clean", clean)
         self._members = [member for member, _ in members]
         self.closed_loop = any(member.closed_loop for member in self._members)
+        self.knowledge = max((member.knowledge for member in self._members), key=KNOWLEDGE.index)
+        self.has_tracking_error = any(member.has_tracking_error for member in self._members)
         self.needs_model = any(member.needs_model for member in self._members)
         self.needs_velocity = any(member.needs_velocity for member in self._members)
         self.needs_ranges = any(member.needs_ranges for member in self._members)

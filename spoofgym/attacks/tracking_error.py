@@ -45,9 +45,10 @@ class TrackingError(AroundAttack):
     kind = "tracking-error"
 
     def __init__(self, attack: Attack, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> None:
-        if isinstance(attack, TrackingError):
-            raise ValueError(f"tracking-error: attack must have no tracking error of its own, got {attack.name!r}")
         super().__init__(attack)
+        if attack.has_tracking_error:
+            raise ValueError(f"tracking-error: attack must have no tracking error of its own, got {attack.name!r}")
+        self.has_tracking_error = True
         self.sigma = validation.non_negative("tracking-error", "sigma", sigma, MOST_SIGMA)
         self.time = validation.zero_or_above("tracking-error", "time", time)
         self.axis = None if axis is None else validation.one_of("tracking-error", "axis", axis, AXES)

@@ -6,13 +6,12 @@ from dataclasses import dataclass, fields
 from typing import Any, TypeAlias, TypeVar
 
 from spoofgym import validation
-from spoofgym.attacks.base import Attack
+from spoofgym.attacks.base import KNOWLEDGE, Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.navigation.family import COUPLINGS
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 
-KNOWLEDGE = ("blind", "shadow", "full")
 ACTIONS = ("rate", "innovation")
 ON_ALARM = ("end", "respond")
 

@@ -7,7 +7,8 @@ Each has a specification:
 - ``DETECTOR > RESPONSE``: a response that follows the alarm of one of the game's detectors alone;
 - ``pool:A+B+C`` or ``pool:A+B+C,weights=2+1+1``: a pool, from which every run draws its opponent. Within it ``/``
   stands for the comma between the options of a part and ``~`` for ``+``, as in every part within a part; the slashes of
-  a ``policy:FOLDER`` stay.
+  a ``policy:FOLDER`` stay;
+- ``tracking-error:policy:FOLDER,sigma=1``, ``partial:...``, ``position-only:...``: an attack around any of these.
 
 In Python a pool is a sequence, too: of specifications and objects, or of pairs of these and a weight.
 """
@@ -27,7 +28,7 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
 from spoofgym.policies.classical import SEPARATOR
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
-from spoofgym.policies.published import policy_folder
+from spoofgym.policies.published import POLICY, policy_folder
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
 from spoofgym.responses.pool import ResponsePool
@@ -35,7 +36,7 @@ from spoofgym.responses.watching import Watching
 from spoofgym.scenario import Scenario
 from spoofgym.specification import Specification, unnest
 
-POLICY, POOL = "policy:", "pool:"
+POOL = "pool:"
 Part = TypeVar("Part")
 
 
@@ -51,8 +52,8 @@ def make_spoofer(given: str | Attack) -> Attack:
     if isinstance(given, str) and given.strip().startswith(POOL):
         return AttackPool([(make_spoofer(part), weight) for part, weight in _written(given)], 0.0, given.strip())
     if isinstance(given, str) and given.strip().startswith(POLICY):
-        return PolicySpoofer(LearnedSpoofer.load(policy_folder(_folder(given))), given.strip())
-    return make_attack(given)
+        return PolicySpoofer(LearnedSpoofer.load(policy_folder(given)), given.strip())
+    return make_attack(given, lambda nested: make_spoofer(_unnested(nested)))
 
 
 def spoofer_pool(attacks: Any, clean: float) -> AttackPool:
@@ -94,7 +95,7 @@ def make_defender(given: Any, scenario: Scenario, detectors: Sequence[Detector])
     if (isinstance(given, str) and given.strip().startswith(POOL)) or isinstance(given, tuple | list):
         return ResponsePool(_members(given, lambda item: make_defender(item, scenario, detectors)))
     if isinstance(given, str) and given.strip().startswith(POLICY):
-        return PolicyDefender(LearnedDefender.load(policy_folder(_folder(given))), given.strip(), scenario)
+        return PolicyDefender(LearnedDefender.load(policy_folder(given)), given.strip(), scenario)
     if isinstance(given, str) and SEPARATOR.strip() in given:
         watcher, _, response = (part.strip() for part in given.partition(SEPARATOR.strip()))
         return Watching(make_defender(response, scenario, detectors), make_detector(watcher).name, detectors)
@@ -105,16 +106,21 @@ def _is_own(text: str) -> bool:
     return text.strip().startswith((POLICY, POOL))
 
 
-def _folder(text: str) -> str:
-    """Name or folder of ``policy:NAME`` or ``policy:FOLDER``.
+def _unnested(text: str) -> str:
+    """The specification of a part within another one; the slashes of a ``policy:FOLDER`` stay.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the part holds a policy itself, whose folder has slashes: they cannot be told from commas.
     """
-    folder = text.strip().removeprefix(POLICY).strip()
-    if not folder:
-        raise ValueError(f"{text!r} names no policy: write policy:NAME or policy:FOLDER")
-    return folder
+    if text.strip().startswith(POLICY):
+        return text
+    _, inside, policy = text.partition(POLICY)
+    if inside and any("=" not in piece for piece in policy.split("/")[1:]):
+        raise ValueError(
+            f"{text!r}: a policy:FOLDER with slashes can be spelled within one other part, not within two; name a "
+            "published agent or a folder of the working directory, or give the parts as a list in Python"
+        )
+    return str(unnest(text))
 
 
 def _members(given: Any, make: Callable[[Any], Part]) -> list[tuple[Part, float]]:
@@ -140,7 +146,7 @@ def _written(text: str) -> list[tuple[str, float]]:
     unknown = sorted(set(specification.options) - {"weights"})
     if specification.value is None or unknown:
         raise ValueError(f"{text!r}: a pool is spelled pool:A+B or pool:A+B,weights=2+1")
-    parts = [part if part.startswith(POLICY) else unnest(part) for part in specification.value.split("+")]
+    parts = [_unnested(part) for part in specification.value.split("+")]
     written = specification.options.get("weights")
     weights = ["1"] * len(parts) if written is None else written.split("+")
     if len(weights) != len(parts):

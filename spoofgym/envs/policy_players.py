@@ -34,16 +34,13 @@ class PolicySpoofer(Attack):
         """Let ``policy`` play; ``name`` is the specification that builds this attack."""
         self._policy, self._name = policy, name
         self._config = spoofer_config(policy)
+        self.knowledge = self._config.knowledge
+        self.has_tracking_error = self._config.tracking_sigma > 0.0
 
     @property
     def name(self) -> str:
         """The specification that builds this attack."""
         return self._name
-
-    @property
-    def knowledge(self) -> str:
-        """What it knows of the victim: "blind", "shadow" or "full"."""
-        return self._config.knowledge
 
     def join(self, simulation: Simulation) -> None:
         """Sit down in a simulation.

@@ -12,7 +12,6 @@ import numpy as np
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
-from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.metrics import attacker_score, undetected_error
@@ -65,8 +64,7 @@ class Evaluation:
         for baseline in baselines:
             rows.append(self._row(baseline, optimum, progress))
         for attack in attacks:
-            knowledge = attack.knowledge if isinstance(attack, PolicySpoofer) else "blind"
-            rows.append(self._row(Baseline(attack.name, knowledge, attack, None), optimum, progress))
+            rows.append(self._row(Baseline(attack.name, attack.knowledge, attack, None), optimum, progress))
         for policy in policies:
             with progress(policy.name):
                 score = attacker_score(self.play_policy(policy))

@@ -13,6 +13,7 @@ from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.opponents import make_defender
 from spoofgym.envs.trained import defender_config
 from spoofgym.evaluation.defence import (
     DefenceEpisodes,
@@ -29,7 +30,6 @@ from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import defenders_report
 from spoofgym.policies.classical import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
 from spoofgym.policies.learned import LearnedDefender
-from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 
 POPULATIONS = {"training": False, "held-out": True}
@@ -176,7 +176,8 @@ class Defenders:
 
     def _classical(self, defender: ClassicalDefender) -> DefenceEpisodes:
         name = make_detector(defender.detector).name
-        return play_response(self._world, name, make_response(defender.response), self._episodes, self._seed)
+        response = make_defender(defender.response, self._world.scenario, self._world.detectors)
+        return play_response(self._world, name, response, self._episodes, self._seed)
 
     def oracle_depth(self, defender: ClassicalDefender) -> DefenceEpisodes:
         """The games of a backtracking defender, each with the depth that turned out best in it."""

@@ -125,11 +125,7 @@ class Matrix:
             ValueError: naming the policy.
         """
         for policy in policies:
-            if spoofer_config(policy).knowledge == "full":
-                raise ValueError(
-                    f"policy {policy.name!r} sees the statistics of its own detector (knowledge 'full'): the matrix "
-                    "takes policies that know less, 'blind' or 'shadow'"
-                )
+            _check_knowledge(policy.name, spoofer_config(policy).knowledge)
 
     def names(self, attacks: Sequence[str], policies: Sequence[LearnedSpoofer]) -> list[str]:
         """Of the attacks that `report` plays with these arguments, the clean games left out."""
@@ -146,7 +142,10 @@ class Matrix:
                 f"attack {lacking[0]!r} needs a matched filter and fixes without velocity, scenario "
                 f"{self.scenario.name!r} has not both"
             )
-        return [known.get(text) or make_spoofer(text) for text in asked if text in known or text not in ORACLES]
+        made = [known.get(text) or make_spoofer(text) for text in asked if text in known or text not in ORACLES]
+        for attack in made:
+            _check_knowledge(attack.name, attack.knowledge)
+        return made
 
     def _detectors(self, given: Sequence[str]) -> list[Detector]:
         detectors = [make_detector(at_arl0(text, self.arl0)) for text in given]
@@ -194,3 +193,11 @@ class Matrix:
             return game
 
         return watch_policy(make, policy.act, self.episodes, self.seed)
+
+
+def _check_knowledge(name: str, knowledge: str) -> None:
+    if knowledge == "full":
+        raise ValueError(
+            f"policy {name!r} sees the statistics of its own detector (knowledge 'full'): the matrix takes policies "
+            "that know less, 'blind' or 'shadow'"
+        )

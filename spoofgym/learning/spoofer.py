@@ -20,8 +20,9 @@ from rich.console import Console
 from stable_baselines3 import PPO
 
 from spoofgym import files
+from spoofgym.attacks.base import KNOWLEDGE
 from spoofgym.command_line import Parser, count
-from spoofgym.envs.config import ACTIONS, KNOWLEDGE, SpooferConfig, configure
+from spoofgym.envs.config import ACTIONS, SpooferConfig, configure
 from spoofgym.learning import checkpoint
 from spoofgym.learning.ppo import Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options

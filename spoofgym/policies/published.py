@@ -12,6 +12,8 @@ import spoofgym
 from spoofgym.policies.learned import POLICY_FILE
 
 AGENTS = "agents"
+POLICY = "policy:"
+"""Begins the specification of a learned policy."""
 
 
 def agents_folder() -> Path:
@@ -41,18 +43,21 @@ def published_folder(name: str) -> Path:
 def policy_folder(text: str) -> Path:
     """The folder of a policy that is given by the name of a published agent or by the path of a run folder.
 
-    The name of a published agent stands for this agent, even where a folder of this name lies in the working directory.
+    ``policy:`` may stand before it. The name of a published agent stands for this agent, even where a folder of this
+    name lies in the working directory.
 
     Raises:
         ValueError: neither; the message lists the valid names.
     """
-    names = published_names()
-    if text in names:
-        return agents_folder() / text
-    if not Path(text).is_dir():
-        kind = "run folder" if os.sep in text else "published agent and no run folder"
-        raise ValueError(f"{text!r} is no {kind}; {_listed(names)}")
-    return Path(text)
+    names, given = published_names(), text.strip().removeprefix(POLICY).strip()
+    if not given:
+        raise ValueError(f"{text!r} names no policy: write policy:NAME or policy:FOLDER")
+    if given in names:
+        return agents_folder() / given
+    if not Path(given).is_dir():
+        kind = "run folder" if os.sep in given else "run folder and no published agent"
+        raise ValueError(f"{given!r} is no {kind}; {_listed(names)}")
+    return Path(given)
 
 
 def _listed(names: list[str]) -> str:

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console, RenderableType
@@ -35,6 +34,7 @@ from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.policies.classical import parse
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
+from spoofgym.policies.published import policy_folder
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -69,11 +69,13 @@ def parser() -> argparse.ArgumentParser:
     add("--scenario", default="liu-flight", help="liu-flight, kujur-flight, recorded:DIR, ... (default: %(default)s)")
     add("--detector", action="append",
         help="the monitor; repeat it for several at once (default: snapshot; with --matrix every family)")
-    add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
+    add("--attacker", action="append", default=[], metavar="POLICY",
+        help="run folder or name of a trained spoofer; repeatable")
     add("--shadow", metavar="SPEC",
         help="scenario whose filter every attacker takes for the victim's, in place of the one it was trained with")
-    add("--defender", action="append", default=[], metavar="RUN|SPEC",
-        help="run folder of a trained defender, or 'detector > response'; repeatable; evaluates defenders instead")
+    add("--defender", action="append", default=[], metavar="POLICY|SPEC",
+        help="run folder or name of a trained defender, or 'detector > response'; repeatable; evaluates defenders "
+        "instead")
     add("--population", action="append", choices=tuple(POPULATIONS),
         help="of attacks on the defenders; repeatable (default: all)")
     add("--matrix", action="store_true",
@@ -83,7 +85,7 @@ def parser() -> argparse.ArgumentParser:
     add("--roc-attack", metavar="SPEC",
         help=f"which attack of the matrix that is (default: {ROC_ATTACK}, or the first where it is not in the matrix)")
     add("--attack", action="append", default=[], metavar="SPEC",
-        help="a scripted attack, e.g. ramp:0.5; repeatable (default with --matrix: "
+        help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default with --matrix: "
         f"{len(ATTACKS)} scripted ones and the optimal ones that fit; with a recorded log: ramp:0.5)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
     add("--episodes", type=count,
@@ -148,7 +150,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
     detectors = calibrated_for_play([make_detector(name) for name in given], scenario, fidelity)
     if isinstance(scenario.family, RecordedFamily):
         return _recorded(options, scenario, detectors)
-    policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
+    policies = [LearnedSpoofer.load(policy_folder(text)) for text in options.attacker]
     if options.shadow is not None:
         policies = [policy.with_shadow(options.shadow) for policy in policies]
     evaluation = Evaluation(
@@ -172,7 +174,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
 def _matrix(options: argparse.Namespace, scenario: Scenario, fidelity: str, terminal: Console) -> dict[str, Any]:
     if options.defender or not scenario.random:
         raise ValueError("--matrix is of detectors and attacks in a simulated scenario: no --defender, no recorded log")
-    policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
+    policies = [LearnedSpoofer.load(policy_folder(text)) for text in options.attacker]
     if options.shadow is not None:
         policies = [policy.with_shadow(options.shadow) for policy in policies]
     matrix = Matrix(
@@ -197,10 +199,13 @@ def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, t
     for text in options.defender:
         if ">" in text:
             given.append(parse(text))
-        elif Path(text).is_dir():
-            policies.append(LearnedDefender.load(Path(text)))
-        else:
-            raise ValueError(f"--defender {text!r} is neither a run folder nor 'detector > response'")
+            continue
+        try:
+            folder = policy_folder(text)
+        except ValueError as error:
+            message = f"--defender {text!r} is neither a run folder nor 'detector > response': {error}"
+            raise ValueError(message) from error
+        policies.append(LearnedDefender.load(folder))
     populations = options.population or tuple(POPULATIONS)
     episodes = options.episodes or DEFENDER_EPISODES
     check_names(policies)
@@ -214,7 +219,9 @@ def _defenders(options: argparse.Namespace, scenario: Scenario, fidelity: str, t
 
 def _recorded(options: argparse.Namespace, scenario: Scenario, detectors: list[Detector]) -> dict[str, Any]:
     if options.attacker:
-        raise ValueError("a recorded log is evaluated with --attack; --attacker needs a simulated scenario")
+        raise ValueError(
+            "a recorded log is evaluated with --attack, e.g. policy:FOLDER; --attacker needs a simulated scenario"
+        )
     if options.figure is not None:
         raise ValueError("--figure draws attackers in a simulated scenario; a recorded log gives a table and JSON")
     attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]

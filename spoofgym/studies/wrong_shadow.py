@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.table import Table
@@ -22,6 +21,7 @@ from spoofgym.evaluation.progress import Progress
 from spoofgym.evaluation.wrong_shadow import check_policies, wrong_shadow_report, wrong_shadows
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.policies.learned import LearnedSpoofer
+from spoofgym.policies.published import policy_folder
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.notes import tell_what_is_new
@@ -71,7 +71,8 @@ def parser() -> argparse.ArgumentParser:
     add = result.add_argument
     add("--scenario", default="liu-flight", help="that of the victim (default: %(default)s)")
     add("--detector", default="snapshot", help="a snapshot test (default: %(default)s)")
-    add("--attacker", type=Path, action="append", default=[], help="run folder of a trained spoofer; repeatable")
+    add("--attacker", action="append", default=[], metavar="POLICY",
+        help="run folder or name of a trained spoofer; repeatable")
     add("--episodes", type=count, default=4000, help="games of each row (default: %(default)s)")
     add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
     add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
@@ -111,7 +112,7 @@ def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         options.threads,
         threshold,
     )
-    policies = [LearnedSpoofer.load(folder) for folder in options.attacker]
+    policies = [LearnedSpoofer.load(policy_folder(text)) for text in options.attacker]
     check_policies(evaluation, policies)
     tell_what_is_new(policies, scenario, "linear", detectors)
     return wrong_shadow_report(evaluation, threshold, policies, progress)

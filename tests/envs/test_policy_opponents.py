@@ -1,8 +1,6 @@
 """Learned policies and pools in the other seat: they play there as they play through their own environment."""
 
 import copy
-import itertools
-import json
 import pickle
 from pathlib import Path
 from typing import Any
@@ -18,10 +16,11 @@ from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
 from spoofgym.evaluation.attackers import Evaluation
 from spoofgym.evaluation.matrix_games import Matrix
-from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
+from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from tests.run_folders import defender, network, spoofer
 
 FLIGHT = "liu-flight:horizon=22,onset=300"
 SKY = "kujur-flight:horizon=12,onset=60"
@@ -35,37 +34,6 @@ SPOOFERS: dict[str, dict[str, Any]] = {
     "innovation": {"scenario": FLIGHT, "knowledge": "shadow", "action": "innovation"},
     "tight": {"scenario": SKY, "knowledge": "shadow"},
 }
-
-
-def network(entries: int, outputs: int, seed: int, size: float = 0.3) -> tuple[Any, Any]:
-    rng = np.random.default_rng(seed)
-    sizes = [entries, 8, outputs]
-    weights = tuple(size * rng.normal(size=(b, a)).astype(np.float32) for a, b in itertools.pairwise(sizes))
-    return weights, tuple(rng.normal(size=b).astype(np.float32) for b in sizes[1:])
-
-
-def saved(policy: Any, configuration: dict[str, Any], folder: Path) -> str:
-    folder.mkdir()
-    policy.save(folder)
-    (folder / CONFIG_FILE).write_text(json.dumps({"environment": configuration}))
-    return f"policy:{folder}"
-
-
-def spoofer(configuration: dict[str, Any], folder: Path) -> str:
-    """A run folder of a spoofer with arbitrary weights, as it is spelled."""
-    given = {name: tuple(value) if isinstance(value, list) else value for name, value in configuration.items()}
-    game = SpooferGame(SpooferConfig(**given), 1)
-    layout = tuple(field.name for field in game.fields)
-    parts = network(len(layout), game.seat.space.shape[0], 1)
-    return saved(LearnedSpoofer(folder, configuration, layout, *parts), configuration, folder)
-
-
-def defender(configuration: dict[str, Any], folder: Path, seed: int = 3) -> str:
-    """A run folder of a defender with arbitrary weights, as it is spelled."""
-    game = DefenderGame(DefenderConfig(**configuration), 1)
-    layout = tuple(field.name for field in game.fields)
-    parts = network(len(layout), int(game.seat.space.nvec.sum()), seed, 3.0)
-    return saved(LearnedDefender(folder, configuration, layout, *parts), configuration, folder)
 
 
 def streams(lanes: int = LANES) -> RunStreams:
@@ -217,7 +185,7 @@ def test_what_a_game_does_not_offer_is_refused_when_it_is_built(tmp_path: Path) 
     ("text", "message"),
     [
         ("policy:", "names no policy: write policy:NAME or policy:FOLDER"),
-        ("policy:nobody", "'nobody' is no published agent and no run folder"),
+        ("policy:nobody", "'nobody' is no run folder and no published agent"),
         ("pool:weights=2", "a pool is spelled pool:A\\+B or pool:A\\+B,weights=2\\+1"),
         ("pool:exclude+latch,weights=1", "2 parts need as many weights, got 1"),
         ("pool:exclude+latch,weights=1+x", "weights must be numbers"),

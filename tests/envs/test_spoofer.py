@@ -12,8 +12,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import spoofgym  # noqa: F401 - registers the environment
+from spoofgym.attacks.base import KNOWLEDGE
 from spoofgym.detectors.chi_square import Windowed
-from spoofgym.envs.config import ACTIONS, KNOWLEDGE
+from spoofgym.envs.config import ACTIONS
 from spoofgym.envs.observation import spoofer_fields
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.spoofer_seat import INNOVATION_UNIT

@@ -1,0 +1,68 @@
+"""`evaluate` takes a policy by its folder or its name, and as the specification of an attack or a defender."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from spoofgym.evaluation import defenders
+from spoofgym.policies import published
+from spoofgym.policies.classical import ClassicalDefender
+from spoofgym.studies import evaluate
+from tests.run_folders import defender, spoofer
+
+FLIGHT = "liu-flight:horizon=40"
+
+
+def report(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    assert evaluate.main(["--scenario", FLIGHT, "--episodes", "8", "--json", "-", *arguments]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.fixture
+def agents(tmp_path, monkeypatch):
+    """The folder of the published agents."""
+    folder = tmp_path / "agents"
+    folder.mkdir()
+    monkeypatch.setattr(published, "agents_folder", lambda: folder)
+    return folder
+
+
+def test_a_spoofer_is_given_by_its_folder_or_its_name(agents, capsys):
+    text = spoofer({"scenario": FLIGHT, "knowledge": "shadow"}, agents / "x")
+    spelled = ("--attacker", str(agents / "x")), ("--attacker", text), ("--attacker", "x"), ("--attacker", "policy:x")
+    rows = [report(capsys, *arguments)["rows"][-1] for arguments in spelled]
+    assert rows[0]["attacker"] == "x"
+    assert rows[1:] == rows[:1] * 3
+
+
+def test_an_attack_tells_what_the_policy_within_it_knows(tmp_path, capsys):
+    text = spoofer({"scenario": FLIGHT, "knowledge": "shadow"}, tmp_path / "x")
+    row = report(capsys, "--attack", f"tracking-error:{text}")["rows"][-1]
+    assert (row["attacker"], row["knowledge"]) == (f"tracking-error:{text}", "shadow")
+
+
+def test_a_defender_is_given_by_its_folder_or_its_name_or_as_a_response(agents, capsys, monkeypatch):
+    monkeypatch.setattr(defenders, "WORLD_DETECTORS", ("snapshot",))
+    monkeypatch.setattr(defenders, "PUBLISHED", ())
+    monkeypatch.setattr(defenders, "tuned_for", lambda scenario: [ClassicalDefender("t", "snapshot", "exclude", True)])
+    text = defender({"scenario": FLIGHT, "attacks": "none", "detectors": ["snapshot"]}, agents / "d")
+    as_response = f"snapshot > {text}"
+    pool = "snapshot > pool:exclude+latch"
+    found = []
+    for given in (str(agents / "d"), text, "d", "policy:d"):
+        all_rows = report(
+            capsys, "--defender", given, "--defender", as_response, "--defender", pool, "--population", "training"
+        )["rows"]
+        rows = {name: [row for row in all_rows if row["defender"] == name] for name in ("d", as_response, pool)}
+        found.append(rows["d"])
+        assert rows[pool]
+        assert [{**row, "defender": "d"} for row in rows[as_response]] == rows["d"]
+    assert found[1:] == found[:1] * 3
+
+
+def test_what_is_no_defender_is_told(tmp_path: Path, capsys):
+    for given in ("nowhere", "policy:nowhere"):
+        assert evaluate.main(["--defender", given]) == 2
+        error = capsys.readouterr().err
+        assert f"--defender '{given}' is neither a run folder nor 'detector > response': 'nowhere' is no run f" in error
