@@ -30,16 +30,21 @@ class PolicySpoofer(Attack):
 
     closed_loop = True
 
-    def __init__(self, policy: LearnedSpoofer, name: str) -> None:
-        """Let ``policy`` play; ``name`` is the specification that builds this attack."""
-        self._policy, self._name = policy, name
+    def __init__(self, policy: LearnedSpoofer, name: str | None = None) -> None:
+        """Let ``policy`` play.
+
+        Args:
+            policy: who plays.
+            name: the specification that builds this attack; None = the name of the policy, which builds none.
+        """
+        self._policy, self._name = policy, policy.name if name is None else name
         self._config = spoofer_config(policy)
         self.knowledge = self._config.knowledge
         self.has_tracking_error = self._config.tracking_sigma > 0.0
 
     @property
     def name(self) -> str:
-        """The specification that builds this attack."""
+        """The specification that builds this attack, or the name of the policy."""
         return self._name
 
     def join(self, simulation: Simulation) -> None:

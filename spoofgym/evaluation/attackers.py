@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,10 @@ import numpy as np
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
-from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.metrics import attacker_score, undetected_error
-from spoofgym.evaluation.monte_carlo import Episodes, play_attack, play_policy
+from spoofgym.evaluation.monte_carlo import Episodes, play_attack
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import attacker_row
 from spoofgym.optimum import expected_play
@@ -23,7 +22,6 @@ from spoofgym.policies.baselines import Baseline, known_baselines, searched_base
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
-from spoofgym.streams import RunStreams
 
 
 @dataclass(frozen=True)
@@ -66,10 +64,10 @@ class Evaluation:
         for attack in attacks:
             rows.append(self._row(Baseline(attack.name, attack.knowledge, attack, None), optimum, progress))
         for policy in policies:
-            with progress(policy.name):
-                score = attacker_score(self.play_policy(policy))
-                exact = self.exact(policy)
-            rows.append(attacker_row(policy.name, spoofer_config(policy).knowledge, score, exact, optimum))
+            player = PolicySpoofer(policy)
+            with progress(player.name):
+                score, exact = attacker_score(self.play(player, self.episodes)), self.exact(policy)
+            rows.append(attacker_row(player.name, player.knowledge, score, exact, optimum))
         return rows
 
     def check_attacks(self, attacks: list[Attack]) -> None:
@@ -87,12 +85,7 @@ class Evaluation:
         Raises:
             ValueError: naming the policy and the first entry that differs, or what cannot be built of its game.
         """
-        for policy in policies:
-            try:
-                fields = self._game(policy, 1).fields
-            except ValueError as error:
-                raise ValueError(f"policy {policy.name!r}: {error}") from error
-            policy.check_layout([field.name for field in fields])
+        self.check_attacks([PolicySpoofer(policy) for policy in policies])
 
     def _baselines(self) -> list[Baseline]:
         if self.threshold is not None:
@@ -122,25 +115,6 @@ class Evaluation:
             threads=self.threads,
         )
 
-    def _game(self, policy: LearnedSpoofer, lanes: int, streams: RunStreams | None = None) -> SpooferGame:
-        """The evaluated game as this policy sees it: its own knowledge, action, memory and shadow filter."""
-        config = replace(
-            spoofer_config(policy),
-            scenario=self.scenario,
-            detector=tuple(self.detectors),
-            fidelity=self.fidelity,
-            threads=self.threads,
-        )
-        return SpooferGame(config, lanes, streams=streams)
-
-    def play_policy(self, policy: LearnedSpoofer) -> Episodes:
-        """Games of a policy."""
-
-        def make(streams: RunStreams) -> SpooferGame:
-            return self._game(policy, len(streams), streams)
-
-        return play_policy(make, policy.act, self.episodes, self.seed)
-
     def exact(self, policy: LearnedSpoofer) -> float | None:
         """Exact undetected error of a policy whose offsets do not depend on chance, m; else None.
 
@@ -149,15 +123,17 @@ class Evaluation:
         config = spoofer_config(policy)
         if self.threshold is None or config.knowledge == "full" or config.tracking_sigma:
             return None
-        offsets = offsets_without_chance(self._game(policy, 1), policy.act)
+        simulation = Simulation(self.scenario, PolicySpoofer(policy), self.detectors, fidelity=self.fidelity, seed=0)
+        offsets = offsets_without_chance(simulation)
         return float(expected_play(self.scenario.linear_model(), offsets, self.threshold).score)
 
 
-def offsets_without_chance(game: SpooferGame, act: Callable[[Any], Any]) -> Floats:
-    """The offsets that a policy sends in a game of one lane, (K, 3), m ENU."""
-    game.reset(np.zeros(1, dtype=np.int64))
+def offsets_without_chance(simulation: Simulation) -> Floats:
+    """The offsets that the attack of a simulation of one run sends, (K, 3), m ENU."""
+    simulation.reset()
     offsets = []
-    for _ in range(game.scenario.timeline.num_epochs):
-        game.step(act(game.observation()))
-        offsets.append(game.seat.offset[0].copy())
+    for _ in range(simulation.scenario.timeline.num_epochs):
+        simulation.resolve()
+        simulation.observe()
+        offsets.append(simulation.offset[0].copy())
     return np.array(offsets)

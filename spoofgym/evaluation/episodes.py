@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
 from spoofgym.envs.defender_game import DefenderGame
-from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.geodesy import horizontal
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
@@ -97,14 +96,14 @@ class SimulationBatch:
 
 
 class GameBatch:
-    """Games of an environment, in which a policy takes the agent's seat.
+    """Games of Defender-v0, in which a policy takes the agent's seat.
 
     Attributes:
         simulation: of the games.
         actions: of the last step, of every game.
     """
 
-    def __init__(self, game: SpooferGame | DefenderGame, act: Act) -> None:
+    def __init__(self, game: DefenderGame, act: Act) -> None:
         """Let ``act`` play all lanes of a game."""
         self.simulation, self._game, self._act = game.simulation, game, act
         self.actions: NDArray[Any] = np.zeros(0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from spoofgym.attacks import make_attack
@@ -12,15 +12,14 @@ from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.opponents import make_spoofer
-from spoofgym.envs.spoofer_game import SpooferGame
+from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
-from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack, watch_policy
+from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.optimal import ORACLES, oracles
 from spoofgym.scenario import Scenario
-from spoofgym.streams import RunStreams
 
 DETECTORS = (
     "snapshot",
@@ -113,9 +112,10 @@ class Matrix:
             ready = self._detectors(detectors or DETECTORS)
         clean = self._play(make_attack(CLEAN), ready, progress)
         rows, curves = matrix_rows(ready, CLEAN, clean), []
-        for name, games in self._games(scripted, policies, ready, progress):
-            rows += matrix_rows(ready, name, games)
-            curves += detection_curves(ready, clean, name, games)
+        for attack in (*scripted, *(PolicySpoofer(policy) for policy in policies)):
+            games = self._play(attack, ready, progress)
+            rows += matrix_rows(ready, attack.name, games)
+            curves += detection_curves(ready, clean, attack.name, games)
         return matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
 
     def check_knowledge(self, policies: Sequence[LearnedSpoofer]) -> None:
@@ -154,19 +154,6 @@ class Matrix:
             raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
         return calibrated_for_play(detectors, self.scenario, self.fidelity)
 
-    def _games(
-        self,
-        attacks: Sequence[Attack],
-        policies: Sequence[LearnedSpoofer],
-        detectors: list[Detector],
-        progress: Progress,
-    ) -> list[tuple[str, WatchedEpisodes]]:
-        games = [(attack.name, self._play(attack, detectors, progress)) for attack in attacks]
-        for policy in policies:
-            with progress(policy.name):
-                games.append((policy.name, self._play_policy(policy, detectors)))
-        return games
-
     def _play(self, attack: Attack, detectors: list[Detector], progress: Progress) -> WatchedEpisodes:
         with progress(attack.name):
             return watch_attack(
@@ -179,20 +166,6 @@ class Matrix:
                 threads=self.threads,
             )
 
-    def _play_policy(self, policy: LearnedSpoofer, detectors: list[Detector]) -> WatchedEpisodes:
-        def make(streams: RunStreams) -> SpooferGame:
-            config = replace(
-                spoofer_config(policy),
-                scenario=self.scenario,
-                detector=tuple(detectors),
-                fidelity=self.fidelity,
-                threads=self.threads,
-            )
-            game = SpooferGame(config, len(streams), streams=streams)
-            policy.check_layout([field.name for field in game.fields])
-            return game
-
-        return watch_policy(make, policy.act, self.episodes, self.seed)
 
 
 def _check_knowledge(name: str, knowledge: str) -> None:

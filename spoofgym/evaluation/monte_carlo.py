@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +10,7 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector, require_threshold
-from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, play
+from spoofgym.evaluation.episodes import SimulationBatch, play
 from spoofgym.geodesy import horizontal
 from spoofgym.scenario import Scenario
 from spoofgym.simulation import Simulation
@@ -91,7 +89,7 @@ class _Watch:
     Where an attack begins, what was seen before is forgotten.
     """
 
-    def __init__(self, batch: SimulationBatch | GameBatch) -> None:
+    def __init__(self, batch: SimulationBatch) -> None:
         self._batch, self._simulation = batch, batch.simulation
         self._thresholds = {name: require_threshold(part) for name, part in self._simulation.detectors.items()}
         detectors, runs = len(self._thresholds), self._simulation.num_runs
@@ -124,9 +122,8 @@ class _Watch:
         self._alarm_error[place, fresh] = error[fresh]
 
     def result(self) -> WatchedEpisodes:
-        """All games of the batch, whose last fix is used, too."""
-        if isinstance(self._batch, SimulationBatch):  # a game of a spoofer has resolved it itself
-            self._batch.resolve()
+        """All games of the batch, after their last fix was used."""
+        self._batch.resolve()
         return WatchedEpisodes(
             self._alarm_epoch,
             self._alarm_error,
@@ -194,30 +191,3 @@ def play_attack(
     return watch_attack(
         scenario, attack, detectors, episodes, seed, fidelity=fidelity, threads=threads
     ).together()
-
-
-def watch_policy(
-    make_game: Callable[[RunStreams], SpooferGame],
-    act: Act,
-    episodes: int,
-    seed: int,
-) -> WatchedEpisodes:
-    """Games of a policy; game i is seeded ``seed + i``, whatever the policy, and meets the noise that an attack would.
-
-    Args:
-        make_game: builds a game with these random streams, a lane each.
-        act: actions for observations (N, D), (N, 3).
-        episodes: how many games.
-        seed: of game 0.
-    """
-    return _join(play(lambda streams: GameBatch(make_game(streams), act), _Watch, episodes, seed, BATCH))
-
-
-def play_policy(
-    make_game: Callable[[RunStreams], SpooferGame],
-    act: Act,
-    episodes: int,
-    seed: int,
-) -> Episodes:
-    """Games of a policy, as all detectors together saw them; arguments as `watch_policy`."""
-    return watch_policy(make_game, act, episodes, seed).together()

@@ -19,6 +19,7 @@ from spoofgym.arrays import Floats
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import Snapshot
+from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.shadow import shadow_model
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.attackers import Evaluation
@@ -116,7 +117,8 @@ def policy_player(evaluation: Evaluation, policy: LearnedSpoofer) -> Player:
 
     def play(shadow: Shadow) -> Play:
         player = policy.with_shadow(shadow.scenario)
-        return Play(evaluation.play_policy(player), evaluation.exact(player))
+        games = evaluation.play(PolicySpoofer(player), evaluation.episodes)
+        return Play(games, evaluation.exact(player))
 
     return play
 

@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.opponents import make_defender, make_spoofer, spoofer_pool
 from spoofgym.envs.spoofer_game import SpooferGame
 from spoofgym.envs.vector import DefenderVectorEnv, SpooferVectorEnv
-from spoofgym.evaluation.attackers import Evaluation
-from spoofgym.evaluation.matrix_games import Matrix
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
@@ -231,17 +228,3 @@ def test_a_policy_that_needs_a_shadow_filter_is_refused_on_a_log_without_a_linea
     monkeypatch.setattr(type(scenario.family), "linear_model", lacking)
     with pytest.raises(ValueError, match=r"'policy:.*' cannot play on scenario .*: scenario 'log' has no linear model"):
         Simulation(scenario, make_spoofer(text), fidelity="strapdown")
-
-
-def test_an_evaluation_takes_a_policy_for_an_attack(tmp_path: Path) -> None:
-    """Its games are those of the policy in its own environment, up to the alarm that ends them there."""
-    text = spoofer(SPOOFERS["shadow"], tmp_path / "x")
-    policy, detector = LearnedSpoofer.load(tmp_path / "x"), make_detector("snapshot")
-    evaluation = Evaluation(make_scenario(FLIGHT), ("snapshot",), [detector], "linear", 20, 3, 1, detector.threshold)
-    attack = make_spoofer(text)
-    evaluation.check_attacks([attack])
-    as_attack, as_policy = evaluation.play(attack, 20), evaluation.play_policy(policy)
-    for name in ("alarm_epoch", "alarm_error", "onset_epoch"):
-        np.testing.assert_array_equal(getattr(as_attack, name), getattr(as_policy, name))
-    matrix = Matrix(make_scenario(FLIGHT), "linear", 1000.0, 20, 3, 1)
-    assert matrix.names([text, "jump"], []) == [text, "jump"]
