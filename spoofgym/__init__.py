@@ -4,16 +4,15 @@ from gymnasium.envs.registration import register, registry
 
 __version__ = "0.1.0"
 
-if "spoofgym/Spoofer-v0" not in registry:
-    register(
-        id="spoofgym/Spoofer-v0",
-        entry_point="spoofgym.envs.spoofer:SpooferEnv",
-        vector_entry_point="spoofgym.envs.vector:SpooferVectorEnv",
-    )
-
-if "spoofgym/Defender-v0" not in registry:
-    register(
-        id="spoofgym/Defender-v0",
-        entry_point="spoofgym.envs.defender:DefenderEnv",
-        vector_entry_point="spoofgym.envs.vector:DefenderVectorEnv",
-    )
+for _name, _module in (
+    ("Spoofer", "spoofer"),
+    ("Defender", "defender"),
+    ("DuelSpoofer", "duel_sides"),
+    ("DuelDefender", "duel_sides"),
+):
+    if f"spoofgym/{_name}-v0" not in registry:
+        register(
+            id=f"spoofgym/{_name}-v0",
+            entry_point=f"spoofgym.envs.{_module}:{_name}Env",
+            vector_entry_point=f"spoofgym.envs.vector:{_name}VectorEnv",
+        )

@@ -30,6 +30,7 @@ class Scenario(Immutable):
         drag_off_rate: the largest rate at which a spoofer moves the position, per axis (E, N, U), m/s.
         error_scale: metres of navigation error that make a spoofer's reward of 1.
         defender_scale: metres of navigation error that cost a defender 1.
+        harm_cap: error at which the harm of a duel is clipped, m.
         depth_table: depths among which a defender chooses, epochs.
         history: epochs that the navigator keeps at least, where somebody can backtrack.
         clock_rate: the largest rate at which a spoofer pulls the clock of a receiver of ranges, m/s.
@@ -40,6 +41,7 @@ class Scenario(Immutable):
     drag_off_rate: tuple[float, float, float]
     error_scale: float
     defender_scale: float = 10.0
+    harm_cap: float = 200.0
     depth_table: tuple[int, ...] = (0, 5, 10, 20, 50)
     history: int = 60
     clock_rate: float = 0.0
@@ -51,6 +53,7 @@ class Scenario(Immutable):
             validation.above(owner, "drag_off_rate", rate)
         validation.above(owner, "error_scale", self.error_scale)
         validation.above(owner, "defender_scale", self.defender_scale)
+        validation.above(owner, "harm_cap", self.harm_cap)
 
     @property
     def truth(self) -> Truth:

@@ -14,7 +14,7 @@ PACKAGE = Path(spoofgym.__file__).parent
 ROOMS = (
     *("geodesy", "mechanization", "timeline", "trajectory", "truth", "sensors", "navigation", "attacks"),
     *("detectors", "responses", "scenario", "clean_starts", "fitting", "simulation", "logs", "scenarios"),
-    *("calibration", "optimum", "policies", "envs", "evaluation", "studies", "report", "learning", "cli"),
+    *("calibration", "optimum", "policies", "envs", "duel", "evaluation", "studies", "report", "learning", "cli"),
 )
 """In the order of docs/architecture.md. What is not named is the ground floor, which knows no room."""
 FILTERS = ("loose", "tight", "credible", "separation")

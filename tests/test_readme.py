@@ -17,4 +17,4 @@ def test_there_are_blocks():
 def test_block_runs(place, capsys):
     exec("import gymnasium as gym, spoofgym\n" + BLOCKS[place], {})
     if "print(" in BLOCKS[place]:
-        assert re.search(r"error \d", capsys.readouterr().out)
+        assert re.search(r"(error|harm) \d", capsys.readouterr().out)

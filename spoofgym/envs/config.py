@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 from spoofgym import validation
 from spoofgym.attacks.base import KNOWLEDGE, Attack
@@ -74,9 +74,14 @@ def _check_coupling(owner: str, coupling: object) -> None:
 class SpooferConfig:
     """Arguments of Spoofer-v0; the environment's page says what each means.
 
+    Attributes:
+        owner: the environment, for messages.
+
     Raises:
         ValueError: a name that is not valid, or a number out of range.
     """
+
+    owner: ClassVar[str] = "Spoofer-v0"
 
     scenario: str | Scenario = "liu-flight"
     detector: str | Detector | tuple[str | Detector, ...] = "snapshot"
@@ -94,7 +99,7 @@ class SpooferConfig:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        owner = "Spoofer-v0"
+        owner = self.owner
         _check_coupling(owner, self.coupling)
         validation.one_of(owner, "knowledge", self.knowledge, KNOWLEDGE)
         validation.one_of(owner, "action", self.action, ACTIONS)
@@ -122,9 +127,14 @@ class SpooferConfig:
 class DefenderConfig:
     """Arguments of Defender-v0; the environment's page says what each means.
 
+    Attributes:
+        owner: the environment, for messages.
+
     Raises:
         ValueError: a number out of range.
     """
+
+    owner: ClassVar[str] = "Defender-v0"
 
     scenario: str | Scenario = "foi-drive"
     attacks: str | Attack | tuple[Weighted[Attack], ...] = "training"
@@ -140,7 +150,7 @@ class DefenderConfig:
     threads: int = 1
 
     def __post_init__(self) -> None:
-        owner = "Defender-v0"
+        owner = self.owner
         _check_coupling(owner, self.coupling)
         validation.text(owner, "fidelity", self.fidelity)
         scale = self.error_scale

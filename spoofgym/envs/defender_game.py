@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from spoofgym import validation
-from spoofgym.arrays import Runs
+from spoofgym.arrays import Flags, Runs
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
@@ -95,6 +95,11 @@ class DefenderGame(OneSeatGame):
         self.seat = DefenderSeat(simulation, config, names)
         self.privileged = PrivilegedState(simulation, self.attacks, self.confounders, scenario.defender_scale)
         super().__init__(simulation, defender=self.seat)
+
+    @property
+    def excluding(self) -> Flags:
+        """Whether the last decision was to exclude, (N,)."""
+        return self.seat.excluding
 
     def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> DefenderOutcome:
         """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action.

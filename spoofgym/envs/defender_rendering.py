@@ -13,6 +13,7 @@ from spoofgym.geodesy import horizontal
 
 if TYPE_CHECKING:
     from spoofgym.envs.defender_game import DefenderGame
+    from spoofgym.envs.duel_game import DuelGame
 
 ERROR, SIGMA, OFFSET = "#0072b2", "#56b4e9", "#d55e00"
 BANDS = (("attack", OFFSET, 0.18), ("multipath", "#e69f00", 0.25), ("outage", "0.5", 0.25))
@@ -25,7 +26,7 @@ class DefenderFigure(GameFigure):
         DependencyNotInstalled: matplotlib is missing.
     """
 
-    def __init__(self, game: DefenderGame) -> None:
+    def __init__(self, game: DefenderGame | DuelGame) -> None:
         """Prepare to record ``game``."""
         super().__init__(game.simulation)
         self._game = game
@@ -42,7 +43,7 @@ class DefenderFigure(GameFigure):
         assert epoch.available is not None
         assert epoch.view is not None
         if self._rows:
-            self._decided.append((bool(game.seat.excluding[0]), int(game.simulation.navigator.backtracked[0])))
+            self._decided.append((bool(game.excluding[0]), int(game.simulation.navigator.backtracked[0])))
         covariance = epoch.view.position_covariance[0]
         self._rows.append(
             (

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.arrays import Runs
+from spoofgym.arrays import Floats, Runs
 from spoofgym.envs.defender_seat import DefenderSeat
+from spoofgym.envs.harm import Harm
 from spoofgym.envs.spoofer_seat import SpooferSeat
 from spoofgym.envs.standing import Standing
 from spoofgym.simulation import Simulation
@@ -26,6 +27,7 @@ class Game:
         num_lanes: N.
         spoofer: the spoofer's seat, if filled from outside.
         defender: the defender's seat, if filled from outside.
+        harm: what the game is worth, where it is counted.
     """
 
     def __init__(
@@ -34,6 +36,7 @@ class Game:
         *,
         spoofer: SpooferSeat | None = None,
         defender: DefenderSeat | None = None,
+        harm: Harm | None = None,
         ends_on_alarm: bool = False,
     ) -> None:
         """Put players around a simulation.
@@ -42,10 +45,12 @@ class Game:
             simulation: the shared world.
             spoofer: over this simulation; None = its attack plays, if it has one.
             defender: over this simulation; None = its response decides, if it has one.
+            harm: counts what the game is worth; None = nobody asks.
             ends_on_alarm: whether an alarm of any detector ends the game.
         """
         self.simulation, self.scenario, self.num_lanes = simulation, simulation.scenario, simulation.num_runs
-        self.spoofer, self.defender = spoofer, defender
+        self.spoofer, self.defender, self.harm = spoofer, defender, harm
+        self._watching = tuple(part for part in (spoofer, defender, harm) if part is not None)
         self._ends_on_alarm = ends_on_alarm
         self._horizon = simulation.scenario.timeline.num_epochs
         self._nobody = np.zeros(simulation.num_runs, dtype=bool)
@@ -60,9 +65,8 @@ class Game:
         self.simulation.reset(lanes)
         if self.spoofer is not None:
             self.spoofer.draw(lanes)
-            self.spoofer.begin(lanes)
-        if self.defender is not None:
-            self.defender.begin(lanes)
+        for part in self._watching:
+            part.begin(lanes)
 
     def advance(
         self,
@@ -84,35 +88,40 @@ class Game:
         moves = None if spoofer is None else spoofer.read(_given(rates))
         choices = None if defender is None else defender.read(_given(decisions))
         simulation.resolve(None if defender is None or choices is None else defender.act(choices))
-        for seat in (spoofer, defender):
-            if seat is not None:
-                seat.resolved()
+        for part in self._watching:
+            part.resolved()
         sent = None if spoofer is None or moves is None else spoofer.act(moves, restarting)
         if restarting is not None and len(restarting):
             simulation.restart(restarting)
             if spoofer is not None:
                 spoofer.draw(restarting)
-        simulation.observe(sent)
-        for seat in (spoofer, defender):
-            if seat is not None:
-                seat.observed(restarting)
+        self._observe(sent)
+        for part in self._watching:
+            part.observed(restarting)
         standing = self._close()
-        for seat in (spoofer, defender):
-            if seat is not None:
-                seat.score(standing)
+        for part in self._watching:
+            part.score(standing)
+
+    def _observe(self, sent: Floats | None) -> None:
+        """Let the next epoch come, with what a spoofer outside sends, (N, 3) or (N, 4); None = the attack's."""
+        self.simulation.observe(sent)
+
+    def _decides_on_last_fix(self) -> bool:
+        """Whether the fix of the last epoch is resolved.
+
+        A defender within the simulation decides on it. One outside does not: its game ends with the observation of
+        that epoch.
+        """
+        return self.defender is None
 
     def _close(self) -> Standing:
-        """End the games that are over.
-
-        A defender within the simulation decides on the fix of the last epoch, too. One outside does not: its game ends
-        with the observation of that epoch.
-        """
+        """End the games that are over."""
         simulation = self.simulation
         alarm = simulation.alarm & (self.index > 0)
         caught = alarm if self._ends_on_alarm else self._nobody
         at_end = self.index == self._horizon
         last = at_end & ~caught & ~simulation.navigator.diverged
-        if self.defender is None and last.any():
+        if self._decides_on_last_fix() and last.any():
             lanes = np.flatnonzero(last)
             simulation.resolve(runs=lanes)
             if self.spoofer is not None:

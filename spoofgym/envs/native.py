@@ -20,7 +20,8 @@ from spoofgym.simulation import Simulation
 MOST_LANES = 20_000
 """A defender's lane takes 100 kB and more: the history of its filter."""
 
-Observations = NDArray[np.float32]
+Observations = Any
+"""What the players of all lanes see: an array (N, D), or a dictionary of them where several play."""
 Values = dict[str, Any]
 """Infos of all lanes: arrays (N,), or a dictionary of them."""
 
@@ -43,7 +44,7 @@ class Game(Protocol):
     simulation: Simulation
 
     @property
-    def observation_space(self) -> spaces.Box:
+    def observation_space(self) -> spaces.Space[Any]:
         """Of one lane."""
 
     @property
@@ -57,7 +58,7 @@ class Game(Protocol):
     def reset(self, lanes: Runs) -> None:
         """Start new games, up to the clean epoch 0."""
 
-    def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> Any:
+    def step(self, actions: Any, restarting: Runs | None = None) -> Any:
         """One epoch of every lane; ``restarting`` lanes begin a new game instead, whatever their action."""
 
     def observation(self) -> Observations:
@@ -263,7 +264,7 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         final = self.game.observation()
         final_obs = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(done):
-            final_obs[lane] = final[lane]
+            final_obs[lane] = _of_lane(final, int(lane))
         final_info = self._step_info(outcome, done)
         info = {} if done.all() else self._step_info(outcome, ~done)
         self.game.reset(np.flatnonzero(done))
@@ -284,8 +285,14 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         info = _masked(self.game.step_values(outcome), mask)
         over = outcome.terminated & mask
         if over.any():
-            info |= _masked(self.game.end_values(outcome), over)
+            _put(info, _masked(self.game.end_values(outcome), over))
         return info
+
+
+def _of_lane(observation: Observations, lane: int) -> Any:
+    if isinstance(observation, dict):
+        return {agent: seen[lane] for agent, seen in observation.items()}
+    return observation[lane]
 
 
 def _masked(values: Values, mask: Flags) -> dict[str, Any]:
@@ -304,10 +311,21 @@ def _masked(values: Values, mask: Flags) -> dict[str, Any]:
     return info
 
 
+def _put(info: dict[str, Any], part: dict[str, Any]) -> None:
+    """Put further entries into an info, those of each agent into its own dictionary."""
+    for key, value in part.items():
+        if isinstance(value, dict) and key in info:
+            _put(info[key], value)
+        else:
+            info[key] = value
+
+
 def _fill(info: dict[str, Any], part: dict[str, Any], mask: Flags) -> None:
     """Put the entries of the lanes in ``mask`` beside those of the others."""
     for key, value in part.items():
-        if key in info:
-            info[key][mask] = value[mask]
-        else:
+        if key not in info:
             info[key] = value
+        elif isinstance(value, dict):
+            _fill(info[key], value, mask)
+        else:
+            info[key][mask] = value[mask]

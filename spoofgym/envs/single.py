@@ -40,7 +40,7 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
     def __init__(self, game: Game, render_mode: str | None, figure: Figure | None) -> None:
         """Take a game of one lane."""
         self.game: Any = game
-        self.observation_space = game.observation_space  # type: ignore[assignment]
+        self.observation_space = game.observation_space
         self.action_space = game.action_space
         self.render_mode = render_mode
         self._figure = figure
@@ -70,7 +70,7 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
         self._playing = True
         if self._figure is not None:
             self._figure.restart()
-        return self.game.observation()[0], _only_lane(self.game.reset_values())
+        return self.game.observation()[0], only_lane(self.game.reset_values())
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One GNSS epoch.
@@ -87,9 +87,9 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
         self._playing = not terminated
         if self._figure is not None:
             self._figure.record()
-        info = _only_lane(self.game.step_values(outcome))
+        info = only_lane(self.game.step_values(outcome))
         if terminated:
-            info |= _only_lane(self.game.end_values(outcome))
+            info |= only_lane(self.game.end_values(outcome))
         return self.game.observation()[0], float(outcome.reward[0]), terminated, False, info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -102,12 +102,12 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
             self._figure.close()
 
 
-def _only_lane(values: Values) -> dict[str, Any]:
+def only_lane(values: Values) -> dict[str, Any]:
     """Infos of the only lane as plain Python values."""
     info: dict[str, Any] = {}
     for key, value in values.items():
         if isinstance(value, dict):
-            info[key] = _only_lane(value)
+            info[key] = only_lane(value)
         else:
             info[key] = value[0] if value.dtype == object else value[0].item()
     return info

@@ -33,6 +33,8 @@ MOST_ENTRIES = 2**26
 """Of the observations of all lanes: 256 MiB."""
 INNOVATION_UNIT = 4.0
 """One unit of the innovation action, in sigma per axis."""
+DECISION_FIELDS = (Field("last fix used", "1", 0.0), Field("epochs taken back with it", "epochs", 20.0))
+"""What a spoofer that sees the defender's decisions sees beside all else."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class SpooferOutcome:
 
 
 def frame_fields(
-    config: SpooferConfig, scenario: Scenario, detectors: Sequence[str], num_lanes: int
+    config: SpooferConfig, scenario: Scenario, detectors: Sequence[str], num_lanes: int, sees_decisions: bool = False
 ) -> tuple[Field, ...]:
     """What one epoch shows a spoofer, checked before a simulation of so many lanes is built.
 
@@ -71,6 +73,7 @@ def frame_fields(
         scenario: of the game.
         detectors: names of those whose statistics a spoofer with knowledge "full" sees.
         num_lanes: N.
+        sees_decisions: whether it sees what the defender decided last.
 
     Raises:
         ValueError: the action does not fit the scenario, or the observation is too large.
@@ -82,10 +85,12 @@ def frame_fields(
             "offset provokes any innovation of the ranges; use action='rate'"
         )
     fields = spoofer_fields(config.knowledge, 3 if ranges else scenario.dimension, tuple(detectors), ranges)
+    if sees_decisions:
+        fields += DECISION_FIELDS
     if num_lanes * config.frames * len(fields) > MOST_ENTRIES:
         raise ValueError(
-            f"{OWNER}: frames times num_envs must leave {MOST_ENTRIES} entries of observations at most, got frames="
-            f"{config.frames} with num_envs={num_lanes}"
+            f"{config.owner}: frames times num_envs must leave {MOST_ENTRIES} entries of observations at most, got "
+            f"frames={config.frames} with num_envs={num_lanes}"
         )
     return fields
 
@@ -109,13 +114,16 @@ class SpooferSeat:
 
     outcome: SpooferOutcome
 
-    def __init__(self, simulation: Simulation, config: SpooferConfig, detectors: Sequence[str]) -> None:
+    def __init__(
+        self, simulation: Simulation, config: SpooferConfig, detectors: Sequence[str], sees_decisions: bool = False
+    ) -> None:
         """Sit down.
 
         Args:
             simulation: the shared world; its spoofer is this one, or chosen by its actions.
             config: what the spoofer knows and does; its scenario, fidelity and response are those of the simulation.
             detectors: names of the simulation's detectors whose statistics a spoofer with knowledge "full" sees.
+            sees_decisions: whether it sees what the defender decided last.
 
         Raises:
             ValueError: the scenario does not offer what the spoofer needs, or the observation is too large.
@@ -123,12 +131,13 @@ class SpooferSeat:
         scenario = simulation.scenario
         self.config, self.simulation = config, simulation
         num_lanes = simulation.num_runs
-        fields = frame_fields(config, scenario, detectors, num_lanes)
+        fields = frame_fields(config, scenario, detectors, num_lanes, sees_decisions)
+        self._sees_decisions = sees_decisions
         self.fields = stacked_fields(fields, config.frames)
         self._ranges = RANGES in scenario.offers
         self.shadow: MeanFilter | None = None
         if config.knowledge != "blind":
-            with validation.argument(OWNER, "shadow" if config.shadow is not None else "scenario"):
+            with validation.argument(config.owner, "shadow" if config.shadow is not None else "scenario"):
                 believed = scenario if config.shadow is None else make_scenario(config.shadow, config.coupling)
                 self.shadow = shadow_filter(scenario, believed, num_lanes, simulation.slices)
         self.observation_space = observation_space(self.fields)
@@ -283,7 +292,15 @@ class SpooferSeat:
                 for name, threshold in zip(self._detectors, self._thresholds, strict=True):
                     ratio = epoch.statistics[name] / threshold
                     parts.append(np.stack([ratio, np.full(len(ratio), threshold)], axis=1))
+        if self._sees_decisions:
+            parts.append(self._last_decision())
         return self._squash(np.concatenate(parts, axis=1))
+
+    def _last_decision(self) -> Floats:
+        """Whether the fix before was used, and the epochs taken back with it, (N, 2); zeros at the start of a game."""
+        simulation = self.simulation
+        decided = simulation.epoch.index > 0
+        return np.stack([simulation.used & decided, simulation.navigator.backtracked * decided], axis=1).astype(float)
 
     def reset_values(self) -> dict[str, Any]:
         """Infos after a reset, of all lanes."""

@@ -1,10 +1,12 @@
-"""The native vector forms of Spoofer-v0 and Defender-v0: N lanes of the same game in one batch."""
+"""The native vector forms of the environments: N lanes of a game in one batch."""
 
 from __future__ import annotations
 
 from spoofgym.arrays import Flags
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.envs.defender_game import DefenderGame
+from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
+from spoofgym.envs.duel_game import DuelDefenderGame, DuelGame, DuelSpooferGame
 from spoofgym.envs.native import NativeVectorEnv
 from spoofgym.envs.spoofer_game import SpooferGame
 
@@ -16,13 +18,42 @@ class SpooferVectorEnv(NativeVectorEnv):
     game_type = SpooferGame
 
 
-class DefenderVectorEnv(NativeVectorEnv):
-    """N lanes of Defender-v0; arguments as `NativeVectorEnv` and those of `spoofgym.envs.defender.DefenderEnv`."""
-
-    config_type = DefenderConfig
-    game_type = DefenderGame
+class _DefendingVectorEnv(NativeVectorEnv):
+    """N lanes of a defender."""
 
     def action_masks(self) -> Flags:
         """Which values of the actions are open to each lane, (N, M), as `DefenderSeat.action_masks`."""
         masks: Flags = self.game.seat.action_masks()
         return masks
+
+
+class DefenderVectorEnv(_DefendingVectorEnv):
+    """N lanes of Defender-v0; arguments as `NativeVectorEnv` and those of `spoofgym.envs.defender.DefenderEnv`."""
+
+    config_type = DefenderConfig
+    game_type = DefenderGame
+
+
+class DuelSpooferVectorEnv(NativeVectorEnv):
+    """N lanes of DuelSpoofer-v0; arguments as `NativeVectorEnv` and `spoofgym.envs.duel_sides.DuelSpooferEnv`."""
+
+    config_type = DuelSpooferConfig
+    game_type = DuelSpooferGame
+
+
+class DuelDefenderVectorEnv(_DefendingVectorEnv):
+    """N lanes of DuelDefender-v0; arguments as `NativeVectorEnv` and `spoofgym.envs.duel_sides.DuelDefenderEnv`."""
+
+    config_type = DuelDefenderConfig
+    game_type = DuelDefenderGame
+
+
+class DuelVectorEnv(NativeVectorEnv):
+    """N duels in one batch; arguments as `NativeVectorEnv` and those of `spoofgym.envs.duel.DuelParallelEnv`.
+
+    Actions, observations and infos are dictionaries by agent, ``spoofer`` and ``defender``, of arrays of N lanes. The
+    reward (N,) is the spoofer's; that of the defender is its negative.
+    """
+
+    config_type = DuelConfig
+    game_type = DuelGame

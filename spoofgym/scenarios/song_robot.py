@@ -196,10 +196,7 @@ def song_robot(
         rule=rule,
         imu_bias=IMU_BIAS,
     )
+    rates = (SPEED, SPEED, SPEED)
     return Scenario(
-        family=family,
-        drag_off_rate=(SPEED, SPEED, SPEED),
-        error_scale=5.0,
-        defender_scale=1.0,
-        depth_table=DEPTHS,
+        family=family, drag_off_rate=rates, error_scale=5.0, defender_scale=1.0, harm_cap=20.0, depth_table=DEPTHS
     )

@@ -2,7 +2,7 @@
 
     python -m tests.golden make runs/golden               # before a change, on this machine
     python -m tests.golden compare runs/golden            # after it: bit for bit
-    python -m tests.golden commit                         # the arrays of the repository, and their tolerances
+    python -m tests.golden commit --kinds duels           # the arrays of the repository, and their tolerances
 
 `commit` plays every episode again in other arithmetic (code of OpenBLAS, NumPy and numba for older processors) and with
 all random numbers moved by one unit in the last place, and allows each quantity ten times the largest difference.
@@ -16,6 +16,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,21 +54,20 @@ def nudge(direction: float) -> None:
     streams._generator = lambda sequence: Nudged(np.random.SFC64(sequence))  # type: ignore[assignment]
 
 
-def make(folder: Path) -> None:
-    """Play all episodes and write them to a folder."""
+def make(folder: Path, kinds: Sequence[str]) -> None:
+    """Play all episodes of some kinds and write them to a folder."""
     if "GOLDEN_NUDGE" in os.environ:
         nudge(float(os.environ["GOLDEN_NUDGE"]))
-    kinds = store.KINDS if folder == store.FOLDER else store.ALL_KINDS
-    for kind, episodes in kinds.items():
-        store.write(folder, kind, {name: play() for name, play in episodes().items()})
+    for kind in kinds:
+        store.write(folder, kind, {name: play() for name, play in store.ALL_KINDS[kind]().items()})
 
 
-def compare(folder: Path) -> int:
-    """Play all episodes and compare them with a folder, bit for bit; the number that differ."""
+def compare(folder: Path, kinds: Sequence[str]) -> int:
+    """Play all episodes of some kinds and compare them with a folder, bit for bit; the number that differ."""
     differing = 0
-    for kind, episodes in store.ALL_KINDS.items():
+    for kind in kinds:
         expected = store.read(folder, kind)
-        for name, play in episodes().items():
+        for name, play in store.ALL_KINDS[kind]().items():
             told = store.differences(expected.pop(name, {}), play())
             differing += bool(told)
             if told:
@@ -79,25 +79,26 @@ def compare(folder: Path) -> int:
     return differing
 
 
-def commit() -> None:
-    """Make the arrays of the repository and measure their tolerances."""
-    make(store.FOLDER)
-    allowed: dict[str, dict[str, float]] = {}
+def commit(kinds: Sequence[str]) -> None:
+    """Make the arrays of some kinds for the repository and measure their tolerances."""
+    make(store.FOLDER, kinds)
+    made = {name for kind in kinds for name in store.ALL_KINDS[kind]()}
+    allowed = {name: gaps for name, gaps in store.tolerances().items() if name not in made}
     for label, variables in VARIATIONS.items():
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as cache:
-            command = [sys.executable, "-m", "tests.golden", "make", folder]
+            command = [sys.executable, "-m", "tests.golden", "make", folder, "--kinds", *kinds]
             # thresholds, too, are calibrated in this arithmetic
             subprocess.run(command, env={**os.environ, **variables, "SPOOFGYM_CACHE": cache}, check=True)
-            largest = _widen(allowed, Path(folder))
+            largest = _widen(allowed, Path(folder), kinds)
         print(f"{label}: largest difference {largest:.3g}")
     kept = {name: {key: float(f"{gap:.2g}") for key, gap in gaps.items()} for name, gaps in sorted(allowed.items())}
     store.TOLERANCES.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n")
 
 
-def _widen(allowed: dict[str, dict[str, float]], folder: Path) -> float:
+def _widen(allowed: dict[str, dict[str, float]], folder: Path, kinds: Sequence[str]) -> float:
     """Allow what a variation made of the episodes; the largest difference of all."""
     largest = 0.0
-    for kind in store.KINDS:
+    for kind in kinds:
         varied = store.read(folder, kind)
         for name, arrays in store.read(store.FOLDER, kind).items():
             for key, array in arrays.items():
@@ -116,13 +117,14 @@ def main() -> int:
     parser = argparse.ArgumentParser("python -m tests.golden", description="Make and compare golden episodes.")
     parser.add_argument("command", choices=("make", "compare", "commit"))
     parser.add_argument("folder", nargs="?", type=Path, default=Path("runs/golden"), help="default: %(default)s")
+    parser.add_argument("--kinds", nargs="+", choices=tuple(store.ALL_KINDS), help="default: all")
     given = parser.parse_args()
     if given.command == "compare":
-        return min(compare(given.folder), 1)
+        return min(compare(given.folder, given.kinds or tuple(store.ALL_KINDS)), 1)
     if given.command == "make":
-        make(given.folder)
+        make(given.folder, given.kinds or tuple(store.ALL_KINDS))
     else:
-        commit()
+        commit(given.kinds or tuple(store.KINDS))
     return 0
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.golden import games, results, simulations
+from tests.golden import duels, games, results, simulations
 
 Arrays = dict[str, np.ndarray]
 FOLDER = Path(__file__).parent / "arrays"
@@ -17,6 +17,7 @@ KINDS: dict[str, Callable[[], dict[str, Callable[[], Arrays]]]] = {
     "simulations": simulations.episodes,
     "games": games.episodes,
     "results": results.episodes,
+    "duels": duels.episodes,
 }
 ALL_KINDS = {**KINDS, "logs": results.real_logs}
 """With games on recorded logs, which are not in the repository."""

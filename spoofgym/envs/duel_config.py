@@ -1,0 +1,101 @@
+"""Arguments of the duel and of its two sides: frozen, typed, and unknown keys are refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from spoofgym import validation
+from spoofgym.attacks.base import Attack
+from spoofgym.detectors.base import Detector
+from spoofgym.envs.config import DEFENDER_DETECTORS, DefenderConfig, SpooferConfig, Weighted
+from spoofgym.responses.base import Response
+from spoofgym.scenario import Scenario
+
+
+class _Spoofer(SpooferConfig):
+    owner: ClassVar[str] = "duel"
+
+
+class _Defender(DefenderConfig):
+    owner: ClassVar[str] = "duel"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DuelConfig:
+    """Arguments of the duel; the page of `spoofgym.envs.duel.DuelParallelEnv` says what each means.
+
+    Raises:
+        ValueError: a name that is not valid, or a number out of range.
+    """
+
+    scenario: str | Scenario = "foi-drive"
+    detectors: str | Detector | tuple[str | Detector, ...] = DEFENDER_DETECTORS
+    knowledge: str = "shadow"
+    action: str = "rate"
+    payoff: str = "error"
+    fidelity: str = "linear"
+    clean: float = 0.5
+    outage: float = 0.15
+    multipath: float = 0.15
+    tracking_sigma: float = 0.0
+    tracking_time: float = 0.0
+    frames: int = 1
+    shadow: str | Scenario | None = None
+    coupling: str | None = None
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        validation.text("duel", "payoff", self.payoff)
+        _ = self.spoofer_side, self.defender_side  # building them checks their arguments
+
+    @property
+    def spoofer_side(self) -> SpooferConfig:
+        """What the spoofer knows and does, as its seat takes it."""
+        return _Spoofer(
+            scenario=self.scenario,
+            detector=self.detectors,
+            knowledge=self.knowledge,
+            action=self.action,
+            fidelity=self.fidelity,
+            on_alarm="respond",
+            tracking_sigma=self.tracking_sigma,
+            tracking_time=self.tracking_time,
+            frames=self.frames,
+            shadow=self.shadow,
+            coupling=self.coupling,
+            threads=self.threads,
+        )
+
+    @property
+    def defender_side(self) -> DefenderConfig:
+        """What the defender sees, as its seat takes it."""
+        return _Defender(
+            scenario=self.scenario,
+            detectors=self.detectors,
+            fidelity=self.fidelity,
+            clean=self.clean,
+            outage=self.outage,
+            multipath=self.multipath,
+            coupling=self.coupling,
+            threads=self.threads,
+        )
+
+    @property
+    def sees_decisions(self) -> bool:
+        """Whether the spoofer sees what the defender decided last."""
+        return self.knowledge == "full"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DuelSpooferConfig(DuelConfig):
+    """Arguments of DuelSpoofer-v0: those of the duel, and who defends."""
+
+    defender: str | Response | tuple[Weighted[Response], ...] = "exclude"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DuelDefenderConfig(DuelConfig):
+    """Arguments of DuelDefender-v0: those of the duel, and who spoofs."""
+
+    spoofer: str | Attack | tuple[Weighted[Attack], ...] = "training"
