@@ -8,7 +8,7 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.kernels import njit
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.facts import LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Epoch
 from spoofgym.navigation.linear_model import LinearModel
@@ -93,7 +93,7 @@ def ramp_signatures(model: LinearModel, interval: float, length: int) -> tuple[F
     epochs, m = len(model.time), model.dimension
     whitener = np.linalg.inv(model.innovation_factor)
     onset = np.arange(1 - length, epochs)
-    error = np.zeros((len(onset), NUM_STATES, HORIZONTAL))
+    error = np.zeros((len(onset), model.num_states, HORIZONTAL))
     offset = np.zeros((m, HORIZONTAL))
     offset[3:5] = np.eye(HORIZONTAL)[: m - 3]
     total = np.zeros((len(onset), HORIZONTAL, HORIZONTAL))

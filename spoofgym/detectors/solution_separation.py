@@ -8,7 +8,6 @@ from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.kernels import njit
-from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.facts import LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Epoch
 from spoofgym.navigation.linear_model import LinearModel
@@ -83,7 +82,7 @@ def separation_map(model: LinearModel, n: int) -> Floats:
     """
     epochs = np.arange(len(model.time))
     gain = np.empty((len(epochs), n, HORIZONTAL, model.dimension))
-    carried = np.zeros((len(epochs), HORIZONTAL, NUM_STATES))
+    carried = np.zeros((len(epochs), HORIZONTAL, model.num_states))
     carried[:, range(HORIZONTAL), range(EAST, EAST + HORIZONTAL)] = 1.0
     for age in range(n):
         row = np.maximum(epochs - age, 0)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
-from spoofgym.navigation.error_model import NUM_STATES, POSITION
+from spoofgym.navigation.error_model import NUM_INERTIAL, POSITION
 from spoofgym.navigation.history import History, restore
 from spoofgym.navigation.interface import Decision, Demands, Innovation
 from spoofgym.parallel import RunSlices
@@ -85,7 +85,7 @@ class FilterBatch(ABC):
         self.index = np.full(num_runs, -1)
         self.diverged = np.zeros(num_runs, dtype=bool)
         self.backtracked = np.zeros(num_runs, dtype=np.int64)
-        self.auxiliary = np.zeros((num_runs, NUM_STATES if demands.auxiliary else 0))
+        self.auxiliary = np.zeros((num_runs, NUM_INERTIAL if demands.auxiliary else 0))
         self._deviation = np.zeros((num_runs, dimension))
         self._whitened = np.zeros((num_runs, dimension))
         self._unweighted = Weights(np.ones(num_runs), np.ones((num_runs, num_slots), dtype=bool))

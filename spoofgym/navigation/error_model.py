@@ -20,11 +20,13 @@ from spoofgym.geodesy import earth_rate, normal_gravity, radii_of_curvature
 from spoofgym.kernels import njit
 
 NUM_NAVIGATION = 9
-NUM_STATES = 15
-INERTIAL = slice(0, NUM_STATES)
+"""Attitude, velocity and position."""
+NUM_INERTIAL = 15
+"""These and the biases of the inertial unit. A filter with more states has the inertial ones first."""
+INERTIAL = slice(0, NUM_INERTIAL)
 VELOCITY = slice(3, 6)
 POSITION = slice(6, 9)
-BIAS = slice(NUM_NAVIGATION, NUM_STATES)
+BIAS = slice(NUM_NAVIGATION, NUM_INERTIAL)
 
 
 @njit(cache=True, nogil=True)

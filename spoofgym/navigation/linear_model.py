@@ -17,7 +17,7 @@ from spoofgym.arrays import Floats
 from spoofgym.immutable import Immutable
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
+from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION, navigation_dynamics, transition_matrix
 from spoofgym.navigation.tuning import FilterTuning, true_noise_density
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.receiver import Receiver
@@ -142,10 +142,10 @@ def error_dynamics(
     """
     samples = receiver.samples_per_fix(trajectory.rate)
     filter_density = np.diag(tuning.noise_density(grade))
-    true_density = np.zeros((NUM_STATES, NUM_STATES))
+    true_density = np.zeros((NUM_INERTIAL, NUM_INERTIAL))
     np.fill_diagonal(true_density[:NUM_NAVIGATION], true_noise_density(grade, true_position_random_walk))
-    transition = np.empty((num_epochs, NUM_STATES, NUM_STATES))
-    noise = np.empty((2, num_epochs, NUM_STATES, NUM_STATES))
+    transition = np.empty((num_epochs, NUM_INERTIAL, NUM_INERTIAL))
+    noise = np.empty((2, num_epochs, NUM_INERTIAL, NUM_INERTIAL))
     motion = Motion(trajectory.attitude, trajectory.velocity, trajectory.position, trajectory.specific_force)
     densities = np.stack([filter_density, true_density]) / trajectory.rate
     _accumulate(motion, 1.0 / trajectory.rate, samples, densities, transition, noise)
@@ -269,12 +269,12 @@ def _accumulate(
 ) -> None:
     """Multiply the transitions of the IMU samples of every epoch, and carry their noise to its end."""
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
-    one = np.empty((NUM_NAVIGATION, NUM_STATES))
-    product = np.empty((NUM_NAVIGATION, NUM_STATES))
+    one = np.empty((NUM_NAVIGATION, NUM_INERTIAL))
+    product = np.empty((NUM_NAVIGATION, NUM_INERTIAL))
     force, middle = np.empty(3), np.empty((3, 3))
     for epoch in range(transition.shape[0]):
         total = transition[epoch]
-        total[:, :] = np.eye(NUM_STATES)
+        total[:, :] = np.eye(NUM_INERTIAL)
         noise[0, epoch, :, :] = 0.0
         noise[1, epoch, :, :] = 0.0
         for i in range(epoch * samples, (epoch + 1) * samples):
@@ -286,10 +286,10 @@ def _accumulate(
             navigation_dynamics(motion.velocity[i], motion.position[i], force, dynamics)
             transition_matrix(dynamics, middle, step, one, work)
             for a in range(NUM_NAVIGATION):
-                for b in range(NUM_STATES):
+                for b in range(NUM_INERTIAL):
                     product[a, b] = 0.0
-                for c in range(NUM_STATES):
-                    for b in range(NUM_STATES):
+                for c in range(NUM_INERTIAL):
+                    for b in range(NUM_INERTIAL):
                         product[a, b] += one[a, c] * total[c, b]
             total[:NUM_NAVIGATION, :] = product
             kalman.predict_covariance(one, densities[0], noise[0, epoch], product)

@@ -8,7 +8,6 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
-from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.mean_maps import expected_columns, final_response
 from spoofgym.optimum.play import HORIZONTAL
@@ -39,7 +38,7 @@ def error_response(model: LinearModel, num_epochs: int) -> Floats:
     Returns:
         G_k of epochs 1..M, (2, M, m), m per unit of whitened innovation.
     """
-    rows = np.zeros((2, NUM_STATES))
+    rows = np.zeros((2, model.num_states))
     rows[:, HORIZONTAL] = np.eye(2)
     return final_response(model, rows, num_epochs)
 

@@ -18,7 +18,7 @@ from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.logs.range_epochs import RangeEpochs
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.divergence import Solution
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Demands, Spoof
 from spoofgym.navigation.linear_model import ErrorDynamics
@@ -119,8 +119,8 @@ class RecordedRanges(RecordedFamily, RangeFamily):
         """What the filter believes of all epochs after the alignment; Φ and Q of the navigation states are left out."""
         ranges, epochs = self.ranges, len(self.epoch_time)
         inertial = ErrorDynamics(
-            transition=np.zeros((epochs, NUM_STATES, NUM_STATES)),
-            process_noise=np.zeros((epochs, NUM_STATES, NUM_STATES)),
+            transition=np.zeros((epochs, NUM_INERTIAL, NUM_INERTIAL)),
+            process_noise=np.zeros((epochs, NUM_INERTIAL, NUM_INERTIAL)),
             true_noise=np.zeros((epochs, NUM_NAVIGATION, NUM_NAVIGATION)),
             observation=np.zeros((epochs, 0, NUM_NAVIGATION)),
         )
@@ -209,16 +209,16 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     def _transitions(self, first: int, stop: int) -> tuple[Floats, Floats]:
         """Φ (e, 9, 15) and Q (e, 9, 9) of the navigation states over epochs first..stop-1 of the clean run."""
         model, clean = self.model, self.clean
-        transition = np.empty((stop - first, NUM_NAVIGATION, NUM_STATES))
+        transition = np.empty((stop - first, NUM_NAVIGATION, NUM_INERTIAL))
         noise = np.empty((stop - first, NUM_NAVIGATION, NUM_NAVIGATION))
         density = np.diag(model.filter_density[:NUM_NAVIGATION])
         steps = model.steps
-        one, no_noise, force = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty(0), np.empty(3)
+        one, no_noise, force = np.empty((NUM_NAVIGATION, NUM_INERTIAL)), np.empty(0), np.empty(3)
         for k in range(first, stop):
             solution = Solution(
                 clean.attitude[k].copy(), clean.velocity[k].copy(), clean.position[k].copy(), clean.bias[k].copy()
             )
-            total, gathered = np.eye(NUM_NAVIGATION, NUM_STATES), np.zeros((NUM_NAVIGATION, NUM_NAVIGATION))
+            total, gathered = np.eye(NUM_NAVIGATION, NUM_INERTIAL), np.zeros((NUM_NAVIGATION, NUM_NAVIGATION))
             for part in range(steps.places[k], steps.places[k + 1]):
                 span = (steps.bounds[part], steps.bounds[part + 1], -1)
                 length = mechanize_part(

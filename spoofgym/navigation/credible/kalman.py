@@ -17,7 +17,7 @@ from scipy.linalg import solve_discrete_lyapunov
 from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.kernels import njit
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.warm_start import COLOUR, NUM_JOINT
 from spoofgym.sensors.receiver import Receiver
@@ -164,7 +164,7 @@ def credible_linear_model(tuning: CredibleTuning, anchored: bool, time: Floats) 
     settled = settled_covariance(tuning)
     before = settled.copy()
     _predict_epoch(tuning, before)
-    transition, prior = np.eye(NUM_STATES), np.zeros((NUM_STATES, NUM_STATES))
+    transition, prior = np.eye(NUM_INERTIAL), np.zeros((NUM_INERTIAL, NUM_INERTIAL))
     after = np.zeros_like(prior)
     for v, p in zip(VELOCITIES, POSITIONS, strict=True):
         places = np.ix_((p, v), (p, v))

@@ -8,7 +8,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
-from spoofgym.navigation.error_model import NUM_STATES
+from spoofgym.navigation.error_model import NUM_INERTIAL
 from spoofgym.navigation.interface import Innovation, Spoof
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.mean import LooseMeanFilter
@@ -22,7 +22,7 @@ class FixFamily(Immutable, ABC):
 
     coupling = "loose"
     slots = 0
-    num_states = NUM_STATES
+    num_states = NUM_INERTIAL
 
     @property
     @abstractmethod

@@ -13,7 +13,7 @@ from spoofgym.mechanization import load_matrix, mechanize, product, rotation, tr
 from spoofgym.navigation import kalman
 from spoofgym.navigation.batch import InnovationArrays
 from spoofgym.navigation.divergence import Solution, solution_of
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES, navigation_dynamics, transition_matrix
+from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION, navigation_dynamics, transition_matrix
 from spoofgym.navigation.history import Ring, keep
 from spoofgym.navigation.loose.innovation import FilterNoise, FilterRuns, FixNoise, form_innovation
 from spoofgym.sensors.imu import gauss_markov_step, white_sample
@@ -114,7 +114,7 @@ def carry(
     covariance, remembers = ring.covariance, ring.past_covariance.shape[1] > 0
     n = covariance.shape[1]
     mean_force, residual_bias, mean = np.empty(3), np.empty(6), np.empty(NUM_NAVIGATION)
-    transition, product = np.empty((NUM_NAVIGATION, NUM_STATES)), np.empty((NUM_NAVIGATION, n))
+    transition, product = np.empty((NUM_NAVIGATION, NUM_INERTIAL)), np.empty((NUM_NAVIGATION, n))
     half_noise = np.zeros((n, n))
     noisy = normals.shape[2] > 0
     last = normals.shape[2] - NUM_EPOCH_NOISES

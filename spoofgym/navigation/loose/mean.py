@@ -14,7 +14,7 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.mean import MeanFilter, Means
 from spoofgym.parallel import RunSlices
@@ -47,7 +47,7 @@ class LooseMeanFilter(MeanFilter):
             num_runs: N.
             slices: the threads to use.
         """
-        super().__init__(num_runs, NUM_STATES, model.dimension, slices)
+        super().__init__(num_runs, model.num_states, model.dimension, slices)
         self.model = model
         self._arrays = mean_model(model)
 
@@ -76,9 +76,9 @@ def expected_sequence(model: LinearModel, offsets: Floats) -> tuple[Floats, Floa
         offsets: of epochs 1..K, (K, 3), m ENU; the offset of epoch 0 is zero.
 
     Returns:
-        u of epochs 1..K, (K, m), and e after epoch K, (15,).
+        u of epochs 1..K, (K, m), and e after epoch K, (n,).
     """
-    whitened, error = np.empty((len(offsets), model.dimension)), np.zeros(NUM_STATES)
+    whitened, error = np.empty((len(offsets), model.dimension)), np.zeros(model.num_states)
     _sequence(offsets, np.diff(model.time), mean_model(model), whitened, error)
     return whitened, error
 
@@ -91,7 +91,7 @@ def _observe(
 
     Args:
         observation: H, (m, 9).
-        error: e⁻, (15,).
+        error: e⁻, (n,).
         offset: of this epoch, (3,), m ENU.
         previous: offset of the epoch before, (3,), m ENU.
         interval: between both, s.
@@ -111,18 +111,19 @@ def _advance(
     """Use the fix of the present epoch, then predict the coming one, of a slice of the runs."""
     columns, observation, factor, gain = model
     prior, error, whitened, coming = means
-    residual, noise, work = np.empty(observation.shape[1]), np.zeros(NUM_STATES), np.empty(NUM_NAVIGATION)
+    n = prior.shape[1]
+    residual, noise, work = np.empty(observation.shape[1]), np.zeros(n), np.empty(NUM_NAVIGATION)
     last = columns.shape[0] - 1
     for run in runs:
         k = index[run]
         if k > 0:
             _observe(observation[k], prior[run], offset[run], previous[run], interval[run], residual)
             kalman.whiten(factor[k], residual, whitened[run])
-            for i in range(NUM_STATES):
+            for i in range(n):
                 error[run, i] = prior[run, i]
             kalman.correct_error(gain[k], whitened[run], error[run])
         if k < last:
-            for i in range(NUM_STATES):
+            for i in range(n):
                 prior[run, i] = error[run, i]
             kalman.predict_error(columns[k + 1], noise, prior[run], work)
             _observe(observation[k + 1], prior[run], offset[run], offset[run], interval[run], residual)
@@ -138,10 +139,10 @@ def _sequence(offsets: Floats, intervals: Floats, model: MeanModel, whitened: Fl
         intervals: from the epochs before, (K,), s.
         model: the filter along epochs 0..K.
         whitened: u, (K, m), result.
-        error: e, (15,), in place.
+        error: e, (n,), in place.
     """
     columns, observation, factor, gain = model
-    residual, noise, work = np.empty(observation.shape[1]), np.zeros(NUM_STATES), np.empty(NUM_NAVIGATION)
+    residual, noise, work = np.empty(observation.shape[1]), np.zeros(error.shape[0]), np.empty(NUM_NAVIGATION)
     previous = np.zeros(3)
     for k in range(1, len(offsets) + 1):
         kalman.predict_error(columns[k], noise, error, work)
@@ -153,7 +154,7 @@ def _sequence(offsets: Floats, intervals: Floats, model: MeanModel, whitened: Fl
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _offset_for(index: Runs, whitened: Floats, model: MeanModel, prior: Floats, offset: Floats) -> None:
-    """s = H e⁻ - L u of the position: whitened (N, 3), prior e⁻ (N, 15); offset (N, 3), result."""
+    """s = H e⁻ - L u of the position: whitened (N, 3), prior e⁻ (N, n); offset (N, 3), result."""
     observation, factor = model.observation, model.innovation_factor
     for run in range(len(index)):
         k = index[run]

@@ -1,9 +1,13 @@
 """Linear maps of the loosely coupled mean recursion: from offsets to innovations and errors, and back.
 
-`mean.py` runs one game at a time in compiled code. Here the equations (Liu 2018, eqs 32-34) act on whole matrices of
-columns, so that a map comes out in one pass:
+The equations (Liu 2018, eqs 32-34) are those of `mean.py`:
 
     e⁻ = Φ e,      u = L⁻¹ (H e⁻ - s),      e = e⁻ - U u.
+
+There compiled loops play a game run by run. Here each line is a matrix product that carries all columns of a map at
+once, or is solved for s, or transposed. A product adds up in another order than a loop, so the two forms differ in the
+last bits and neither can replace the other without changing results; `tests/navigation/test_mean.py` holds them
+together.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from spoofgym.arrays import Floats
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.linear_model import LinearModel
 
 
@@ -46,7 +50,7 @@ def offsets_of(model: LinearModel, whitened: Floats) -> Floats:
         ValueError: m is not 3.
     """
     check_position_fix(model, "an offset for every innovation")
-    error = np.zeros(NUM_STATES)
+    error = np.zeros(model.num_states)
     offsets = np.empty_like(whitened)
     for k, mean in enumerate(whitened, start=1):
         error = model.transition[k] @ error
@@ -64,10 +68,10 @@ def expected_columns(model: LinearModel, deviations: Iterable[Floats], num_colum
         num_columns: C.
 
     Returns:
-        u of epochs 1..K, (K, m, C), and e after epoch K, (15, C).
+        u of epochs 1..K, (K, m, C), and e after epoch K, (n, C).
     """
     whitened = np.empty((model.num_epochs, model.dimension, num_columns))
-    error = np.zeros((NUM_STATES, num_columns))
+    error = np.zeros((model.num_states, num_columns))
     for k, deviation in enumerate(deviations, start=1):
         error = model.transition[k] @ error
         _whiten(model.innovation_factor[k], _observed(model, k, error) - deviation, whitened[k - 1])
@@ -82,7 +86,7 @@ def final_response(model: LinearModel, rows: Floats, num_epochs: int) -> Floats:
 
     Args:
         model: the filter along the scenario.
-        rows: A, (r, 15).
+        rows: A, (r, n).
         num_epochs: M, the epoch whose error counts.
 
     Returns:
@@ -96,7 +100,7 @@ def final_response(model: LinearModel, rows: Floats, num_epochs: int) -> Floats:
 
 
 def _observed(model: LinearModel, epoch: int, error: Floats) -> Floats:
-    """H e of errors (15,) or (15, C)."""
+    """H e of errors (n,) or (n, C)."""
     observed: Floats = model.observation[epoch] @ error[:NUM_NAVIGATION]
     return observed
 
@@ -111,6 +115,6 @@ def _whiten(factor: Floats, residual: Floats, whitened: Floats) -> None:
 
 
 def _corrected(model: LinearModel, epoch: int, error: Floats, whitened: Floats) -> Floats:
-    """e⁻ - U u; errors (15,) or (15, C)."""
+    """e⁻ - U u; errors (n,) or (n, C)."""
     corrected: Floats = error - model.whitened_gain[epoch].T @ whitened
     return corrected

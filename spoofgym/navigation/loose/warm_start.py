@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spoofgym.arrays import Floats
-from spoofgym.navigation.error_model import NUM_NAVIGATION, NUM_STATES
+from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION
 from spoofgym.navigation.linear_model import ErrorDynamics, filter_gains, semidefinite_factor
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.sensors.imu import ImuGrade
@@ -65,8 +65,8 @@ def cold_start(
     for part, sigma in ((INSTABILITY, grade.instability_sigma), (CONSTANT_BIAS, grade.bias_sigma)):
         variance = np.diag(np.square(sigma))
         joint[part, part] = variance
-        joint[NUM_NAVIGATION:NUM_STATES, part] = variance
-        joint[part, NUM_NAVIGATION:NUM_STATES] = variance
+        joint[NUM_NAVIGATION:NUM_INERTIAL, part] = variance
+        joint[part, NUM_NAVIGATION:NUM_INERTIAL] = variance
     joint[COLOUR, COLOUR] = np.diag(np.square(receiver.markov_sigma))
     if ranges is not None:
         joint[RANGES, RANGES] = np.diag(ranges.sigma**2)
@@ -105,12 +105,12 @@ def warm_up(
     size = len(joint)
     advance, noise = np.zeros((size, size)), np.zeros((size, size))
     advance[INSTABILITY, INSTABILITY] = decay * np.eye(6)
-    advance[NUM_NAVIGATION:NUM_STATES, INSTABILITY] = (decay - 1.0) * np.eye(6)
+    advance[NUM_NAVIGATION:NUM_INERTIAL, INSTABILITY] = (decay - 1.0) * np.eye(6)
     advance[COLOUR, COLOUR] = colour_decay * np.eye(3)
     advance[CONSTANT_BIAS, CONSTANT_BIAS] = np.eye(6)
     step = np.diag((1.0 - decay**2) * np.square(grade.instability_sigma))
-    for a in (INSTABILITY, slice(NUM_NAVIGATION, NUM_STATES)):
-        for b in (INSTABILITY, slice(NUM_NAVIGATION, NUM_STATES)):
+    for a in (INSTABILITY, slice(NUM_NAVIGATION, NUM_INERTIAL)):
+        for b in (INSTABILITY, slice(NUM_NAVIGATION, NUM_INERTIAL)):
             noise[a, b] = step
     noise[COLOUR, COLOUR] = np.diag((1.0 - colour_decay**2) * np.square(receiver.markov_sigma))
     if ranges is not None:

@@ -26,9 +26,9 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
+from spoofgym.navigation.error_model import INERTIAL, NUM_INERTIAL, POSITION
 from spoofgym.navigation.packed import packed_size
 from spoofgym.navigation.tight.model import TightModel
-from spoofgym.navigation.tight.states import INERTIAL, NUM_INERTIAL, POSITION
 
 ORIGIN_LIFE = 600.0
 """Time after which the origin is moved on, s: about the time constant of a free vertical channel, in which C grows.

@@ -9,9 +9,9 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
+from spoofgym.navigation.error_model import NUM_INERTIAL
 from spoofgym.navigation.packed import unpack
 from spoofgym.navigation.separation.coasting import PACKED
-from spoofgym.navigation.tight.states import NUM_INERTIAL
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -12,6 +12,7 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.kernels import njit
+from spoofgym.navigation.error_model import NUM_INERTIAL
 from spoofgym.navigation.separation.coasting import PACKED, CoastingTables
 from spoofgym.navigation.separation.covariances import (
     bring_back,
@@ -22,7 +23,6 @@ from spoofgym.navigation.separation.covariances import (
     with_gained,
 )
 from spoofgym.navigation.tight.kalman import FIRST_POSITION
-from spoofgym.navigation.tight.states import NUM_INERTIAL
 
 
 class Windows(NamedTuple):

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spoofgym.arrays import Floats
-from spoofgym.navigation.error_model import BIAS, INERTIAL, NUM_STATES, POSITION, VELOCITY
+from spoofgym.navigation.error_model import BIAS, INERTIAL, NUM_INERTIAL, POSITION, VELOCITY
 from spoofgym.sensors.geometry import SatelliteGeometry
 from spoofgym.sensors.ranging import obliquity, troposphere_mapping
 
@@ -52,8 +52,6 @@ __all__ = [
     "slot_states",
 ]
 
-NUM_INERTIAL = NUM_STATES
-"""States of the loosely coupled filter, which come first; their places are those of `error_model`."""
 CLOCK, DRIFT, TROPOSPHERE = range(NUM_INERTIAL, NUM_INERTIAL + 3)
 NUM_COMMON = NUM_INERTIAL + 3
 PER_SATELLITE = 5
