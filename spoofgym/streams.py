@@ -41,7 +41,9 @@ class RunStreams:
         seed = validation.seed("random streams", seed)
         num_runs = validation.runs("random streams", "num_runs", num_runs)
         seeds = [None] * num_runs if seed is None else [seed + i for i in range(num_runs)]
-        return cls([np.random.Generator(np.random.PCG64(np.random.SeedSequence(s))) for s in seeds])
+        streams = cls([])
+        streams._sequences = [np.random.SeedSequence(s) for s in seeds]
+        return streams
 
     def __len__(self) -> int:
         return len(self._sequences)

@@ -145,13 +145,15 @@ def error_dynamics(
     true_density = np.zeros((NUM_INERTIAL, NUM_INERTIAL))
     np.fill_diagonal(true_density[:NUM_NAVIGATION], true_noise_density(grade, true_position_random_walk))
     transition = np.empty((num_epochs, NUM_INERTIAL, NUM_INERTIAL))
-    noise = np.empty((2, num_epochs, NUM_INERTIAL, NUM_INERTIAL))
-    motion = Motion(trajectory.attitude, trajectory.velocity, trajectory.position, trajectory.specific_force)
     densities = np.stack([filter_density, true_density]) / trajectory.rate
+    if np.array_equal(*densities):
+        densities = densities[:1]
+    noise = np.empty((len(densities), num_epochs, NUM_INERTIAL, NUM_INERTIAL))
+    motion = Motion(trajectory.attitude, trajectory.velocity, trajectory.position, trajectory.specific_force)
     _accumulate(motion, 1.0 / trajectory.rate, samples, densities, transition, noise)
     ends = samples * np.arange(1, num_epochs + 1)
     observation = observation_matrices(trajectory, receiver, ends)
-    return ErrorDynamics(transition, noise[0], noise[1, :, :NUM_NAVIGATION, :NUM_NAVIGATION], observation)
+    return ErrorDynamics(transition, noise[0], noise[-1, :, :NUM_NAVIGATION, :NUM_NAVIGATION], observation)
 
 
 def observation_matrices(trajectory: Trajectory, receiver: Receiver, samples: np.ndarray) -> Floats:
@@ -267,7 +269,7 @@ class Motion(NamedTuple):
 def _accumulate(
     motion: Motion, step: float, samples: int, densities: Floats, transition: Floats, noise: Floats
 ) -> None:
-    """Multiply the transitions of the IMU samples of every epoch, and carry their noise to its end."""
+    """Multiply the transitions of the IMU samples of every epoch, and carry noise of each density to its end."""
     dynamics, work = np.empty((NUM_NAVIGATION, NUM_NAVIGATION)), np.empty((2, NUM_NAVIGATION, NUM_NAVIGATION))
     one = np.empty((NUM_NAVIGATION, NUM_INERTIAL))
     product = np.empty((NUM_NAVIGATION, NUM_INERTIAL))
@@ -275,8 +277,7 @@ def _accumulate(
     for epoch in range(transition.shape[0]):
         total = transition[epoch]
         total[:, :] = np.eye(NUM_INERTIAL)
-        noise[0, epoch, :, :] = 0.0
-        noise[1, epoch, :, :] = 0.0
+        noise[:, epoch, :, :] = 0.0
         for i in range(epoch * samples, (epoch + 1) * samples):
             middle[:, :] = 0.5 * (motion.attitude[i] + motion.attitude[i + 1])
             for a in range(3):
@@ -288,9 +289,11 @@ def _accumulate(
             for a in range(NUM_NAVIGATION):
                 for b in range(NUM_INERTIAL):
                     product[a, b] = 0.0
-                for c in range(NUM_INERTIAL):
+                for c in range(NUM_NAVIGATION):
                     for b in range(NUM_INERTIAL):
                         product[a, b] += one[a, c] * total[c, b]
+                for c in range(NUM_NAVIGATION, NUM_INERTIAL):  # biases stay what they are
+                    product[a, c] += one[a, c]
             total[:NUM_NAVIGATION, :] = product
-            kalman.predict_covariance(one, densities[0], noise[0, epoch], product)
-            kalman.predict_covariance(one, densities[1], noise[1, epoch], product)
+            for d in range(len(densities)):
+                kalman.predict_covariance(one, densities[d], noise[d, epoch], product)

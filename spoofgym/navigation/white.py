@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats
+from spoofgym.kernels import njit
 from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.timeline import Timeline
 
@@ -42,13 +43,27 @@ class WhiteInnovations:
         k = min(max(epoch, 0), len(self.factor) - 1)
         present = None if self.present is None else np.broadcast_to(self.present[k], (n, m))
         response = None if self.range_response is None else np.broadcast_to(self.range_response[k], (n, m, 3))
-        whitened = normals if present is None else np.where(present, normals, 0.0)
-        residual, nis = np.zeros((n, m)), np.zeros(n)
-        for j in range(m):
-            residual += whitened[:, j, None] * self.factor[k, :, j]
-            nis += whitened[:, j] ** 2
+        whitened = np.ascontiguousarray(normals if present is None else np.where(present, normals, 0.0))
+        residual, nis = np.empty((n, m)), np.empty(n)
+        _colour(whitened, np.ascontiguousarray(self.factor[k].T), residual, nis)
         covariance = np.broadcast_to(self.covariance[k], (n, m, m))
         return Innovation(residual, covariance, whitened, nis, response, present)
+
+
+@njit(cache=True, nogil=True)
+def _colour(whitened: Floats, columns: Floats, residual: Floats, nis: Floats) -> None:
+    """Write L w and |w|² of each run, whose w (N, m) is given; ``columns`` are those of L, lower, (m, m)."""
+    n, m = whitened.shape
+    for run in range(n):
+        square = 0.0
+        for i in range(m):
+            residual[run, i] = 0.0
+        for j in range(m):
+            normal = whitened[run, j]
+            square += normal * normal
+            for i in range(j, m):
+                residual[run, i] += normal * columns[j, i]
+        nis[run] = square
 
 
 def white_epochs(white: WhiteInnovations, timeline: Timeline, normals: Floats) -> list[Epoch]:
