@@ -1,9 +1,12 @@
 """Thresholds of re-use, measured while the filter coasts."""
 
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from spoofgym.calibration import reuse
 from spoofgym.calibration.reuse import LONGEST, SHORTEST, calibrated_reuse, coasting_nis
 from spoofgym.detectors.chi_square import quantile
 from spoofgym.navigation.interface import Decision, Demands
@@ -73,10 +76,12 @@ def test_what_cannot_be_calibrated_is_refused():
         calibrated_reuse(make_response("exclude:reuse=3"), make_scenario(FLIGHT), p=0.0)
 
 
-def test_the_receiver_of_the_drive_needs_a_threshold_of_its_own():
+def test_the_receiver_of_the_drive_needs_a_threshold_of_its_own(monkeypatch):
     """Its error is 0.6 m where the filter believes in 3 m: in use the NIS is tiny, while coasting it is not."""
+    monkeypatch.setattr(reuse, "_KNOWN", {})
+    monkeypatch.setattr(reuse, "coasting_nis", partial(coasting_nis, runs=600))
     scenario = make_scenario("foi-drive:receiver=foi")
-    using = Simulation(scenario, num_runs=500, seed=2)
+    using = Simulation(scenario, num_runs=200, seed=2)
     using.reset()
     nis = []
     for _ in range(scenario.timeline.num_epochs):

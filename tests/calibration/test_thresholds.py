@@ -12,7 +12,7 @@ from spoofgym.calibration import calibrate, calibrated, measure_arl0, poisson_in
 from spoofgym.calibration import thresholds as calibration
 from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.calibration.first_alarms import FirstAlarms
-from spoofgym.detectors import Acna, Snapshot, Windowed, make_detector
+from spoofgym.detectors import Acna, Snapshot, make_detector
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.white import WhiteInnovations
 
@@ -104,14 +104,6 @@ def test_acna_jump_test_against_the_waiting_time_for_a_run_of_two():
 
     allowed = 1.18  # 5.3 standard errors of 1200 first alarms, and the warm start
     assert threshold_for(arl0 / allowed) < result.threshold < threshold_for(arl0 * allowed)
-
-
-def test_shipped_window_threshold_has_its_arl0():
-    """On noise of its own."""
-    detector = Windowed()
-    detector.bind(1, 3)
-    result = measure_arl0(detector, white_statistics(np.eye(3), 1000), detector.threshold, min_epochs=1.4e7, seed=99)
-    assert_poisson(result.first_alarms, result.epochs_at_risk / 1e5)
 
 
 class Stub(SimpleNamespace):

@@ -55,7 +55,28 @@ def test_self_tuning_filter_is_blind_in_white_noise_at_a_matched_rate():
     assert stats.binomtest(only_common, only_common + only_tuned, 0.5, alternative="greater").pvalue < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("noise", ["white", "markov"])
+def test_the_self_tuning_filter_flies_at_160_hz(noise):
+    times, nis = statistic(Setup(SELF_TUNING, noise, 160), 2.0, 2, 0)
+    assert nis.shape == (2, len(times))
+    assert np.isfinite(nis).all()
+
+
+@pytest.fixture
+def _flown_at_10_hz(monkeypatch):
+    """Flights at 160 Hz, sixteen times as long, are those at 10 Hz with every epoch sixteen times."""
+
+    def flown(setup, runs, seed):
+        flights = fly(Setup(setup.filter, setup.noise, 10), runs, seed)
+        if setup.rate == 10:
+            return flights
+        clean, *spoofed = (np.repeat(nis, 16, axis=1) for nis in (flights.clean, *flights.spoofed.values()))
+        return Flights(clean, dict(zip(flights.spoofed, spoofed, strict=True)), np.arange(1, 801) / 160.0)
+
+    monkeypatch.setattr(shadmehri_2025, "fly", flown)
+
+
+@pytest.mark.usefixtures("_flown_at_10_hz")
 def test_rows_have_every_setup_and_figures_of_the_paper():
     report = shadmehri_2025.reproduce(3, 0, quick=True)
     assert report.paper == "shadmehri-2025"
