@@ -63,10 +63,10 @@ def program(main: Callable[[Sequence[str] | None], int | None]) -> Program:
 
 
 def quiet_start() -> None:
-    """Let Ctrl-C end a program in one line while it is still importing, too.
+    """Let Ctrl-C end a program in one line, even while it is still importing.
 
-    For packages of programs: nothing happens but where Python is looking for the module of ``python -m``, which it
-    shows by its first argument.
+    For packages of programs. It acts only while Python looks for the module of ``python -m``: the first argument of the
+    process shows that.
     """
     if sys.argv[:1] == ["-m"]:
         sys.excepthook = _end_of_start

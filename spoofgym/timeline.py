@@ -66,7 +66,7 @@ class Timeline:
         return float(self.times[-1])
 
     def between(self, first: Runs, last: Runs) -> Floats:
-        """Time from epochs to others, s; where it is a multiple of the interval but for rounding, that multiple.
+        """Time from epochs to others, s; a multiple of the interval where it differs from one by rounding alone.
 
         Args:
             first: epochs, of any shape; those before epoch 0 count as the interval apart.

@@ -36,7 +36,7 @@ class Meaconing(FixedOffsets):
 
     All three axes are shifted, backward along the vehicle's own track, by the distance that it goes in the delay: an
     attack without any knowledge of receiver or filter. A meaconer with a fixed antenna is another attack: it would show
-    the receiver the position of that antenna. The clock error that a replay brings, too, is not part of a fix. The
+    the receiver the position of that antenna. A replay also brings a clock error, which is not part of a fix. The
     track is the integral of the true velocity; before the game it goes on straight backward.
 
     Args:

@@ -110,7 +110,7 @@ class AttackPool(Attack):
             member.join(simulation)
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
-        """Draw the opponents of new episodes, and all that these will do, but for those in closed loop."""
+        """Draw the opponents of new episodes and, of those in open loop, all that they will do."""
         draws = np.array([streams(run, "opponent").random(2) for run in runs.tolist()])
         member = np.minimum(np.searchsorted(self._bounds, draws[:, 1], side="right"), len(self._members) - 1)
         self.member[runs] = np.where(draws[:, 0] < self.clean, CLEAN, member)

@@ -90,8 +90,8 @@ class Px4Gate(Gate):
 class ArduPilotGate(Gate):
     """ArduPilot's gate on the horizontal position: (ν_N² + ν_E²) / (gate² (S_N + S_E)).
 
-    With equal variances it is chi-square with 2 degrees of freedom over 2 gate². Height and velocity, which ArduPilot
-    gates likewise, are left out. What it does with a fix beyond its gate is a response
+    With equal variances it is chi-square with 2 degrees of freedom over 2 gate². ArduPilot also gates height and
+    velocity; these gates are left out. What it does with a fix beyond its gate is a response
     (`spoofgym.responses.ardupilot`). Args and errors as `Gate`.
     """
 

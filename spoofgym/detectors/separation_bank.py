@@ -38,9 +38,9 @@ class SeparationBank(ThresholdDetector):
     All windows are followed at once (`spoofgym.navigation.separation.windows`). Where the gains are shared their
     variances are tabulated; where every run has a covariance of its own they are the run's, what it has left out or
     taken back included, and an epoch that the filter does not use is separated as if it were. What was taken back is
-    gone from the windows, too. A filter that was reset to its ranges separates from the coasting by the jump, too. In
-    the strapdown fidelity Φ is that along the truth. Where innovations before epoch 0 are drawn, these epochs are as
-    epoch 0.
+    also gone from the windows. A filter that was reset to its ranges separates from the coasting by this jump as well.
+    In the strapdown fidelity Φ is that along the truth. Where innovations before epoch 0 are drawn, these epochs are
+    as epoch 0.
 
     Args:
         n: windows that are open at once, which is also their length in epochs.

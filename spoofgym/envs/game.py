@@ -45,7 +45,7 @@ class Game:
             simulation: the shared world.
             spoofer: over this simulation; None = its attack plays, if it has one.
             defender: over this simulation; None = its response decides, if it has one.
-            harm: counts what the game is worth; None = nobody asks.
+            harm: counts what the game is worth; None = nothing is counted.
             ends_on_alarm: whether an alarm of any detector ends the game.
         """
         self.simulation, self.scenario, self.num_lanes = simulation, simulation.scenario, simulation.num_runs

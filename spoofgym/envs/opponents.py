@@ -10,7 +10,7 @@ Each has a specification:
   a ``policy:FOLDER`` stay;
 - ``tracking-error:policy:FOLDER,sigma=1``, ``partial:...``, ``position-only:...``: an attack around any of these.
 
-In Python a pool is a sequence, too: of specifications and objects, or of pairs of these and a weight.
+In Python a pool may also be a sequence of specifications and objects, or of pairs of these and a weight.
 """
 
 from __future__ import annotations

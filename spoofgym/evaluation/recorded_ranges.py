@@ -60,7 +60,7 @@ class Course:
         nis: (K, N).
         degrees: of freedom of each nis, (K,).
         statistics: of each detector by its label, (K, N).
-        thresholds: likewise, nominal.
+        thresholds: nominal one of each detector, by its label.
     """
 
     time: Floats

@@ -26,7 +26,7 @@ class StanfordDiagram:
         edges: of the cells, the same on both axes, (B + 1,), m; the alert limit is one of them.
         counts: by error and protection level, (B, B); the last row and the last column reach to infinity.
         regions: epochs in each region, in the order of `NAMES`, (4,); exact, while cells on the diagonal hold two.
-        unavailable_misleading: epochs of the unavailable ones whose error is beyond the protection level, too.
+        unavailable_misleading: epochs of the unavailable ones whose error is also beyond the protection level.
     """
 
     alert_limit: float

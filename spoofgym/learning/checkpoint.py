@@ -21,7 +21,7 @@ State = dict[str, Any]
 
 
 def learner_state(learner: PPO) -> State:
-    """A copy of all that decides how a learner goes on, but for its random numbers, which every leg draws anew."""
+    """A copy of all that decides how a learner goes on, without its random numbers: every leg draws new ones."""
     policy = learner.policy
     moments = {
         name: {key: value.detach().clone() for key, value in policy.optimizer.state[parameter].items()}

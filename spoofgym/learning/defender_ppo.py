@@ -118,7 +118,7 @@ class PrivilegedVecEnv(SB3VecEnv):
         return self._widen(super().reset())
 
     def step_wait(self) -> VecEnvStepReturn:
-        """One step of all lanes; games end by termination only: nobody asks for the value of their last state."""
+        """One step of all lanes. Games end by termination only, so that the value of their last state is not needed."""
         observation, reward, done, infos = super().step_wait()
         return self._widen(observation), reward, done, infos
 

@@ -72,7 +72,7 @@ class Place:
 
     Attributes:
         trial: which one goes on; as many as there are trials = the training of the best.
-        before: steps of trials that have ended, but for those of the learner that goes on.
+        before: steps of trials that have ended, without those of the learner that goes on.
         best: the best of the trials that have ended; None before any has.
         best_trial: which one that was.
         learner: the state of the learner that goes on; None = it begins.

@@ -25,11 +25,11 @@ class Watch(BaseCallback):
     """Progress bar over a whole run, and a checkpoint after every leg.
 
     A leg begins with new games in all lanes and random numbers of its own, which the seed of the run, the learner and
-    the steps that it has played decide. So what comes after a checkpoint does not depend on what was before it but
+    the steps that it has played decide. So what comes after a checkpoint depends on what was before it only
     through the learner, and a run that is resumed there goes on as if nothing had stopped it.
 
     Attributes:
-        steps_before: steps of the learners before the present one, which the bar counts, too.
+        steps_before: steps of the learners before the present one, which the bar counts as well.
         stream: numbers that tell the present learner's random numbers from those of others: the seed of the run, and
             which learner of the run it is.
     """

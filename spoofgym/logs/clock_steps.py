@@ -23,20 +23,22 @@ STEP = 8.0
 """Least step of the clock from one fix to the next, in the 1 sigma that the ranges give it; multipath in a city reached
 6. A smaller step stays in the ranges."""
 RATE_STEP = 12.0
-"""Least step in the rate of the clock, likewise, where range rates show a step of the clock as a single large value."""
+"""Least step in the rate of the clock, in the 1 sigma that the range rates give it. Some receivers show a step of the
+clock as a single large range rate."""
 SIGMA_WITHOUT_FIX = (300.0, 30.0)
 """1 sigma of the clock, m, and of its rate, m/s, where too few satellites give a fix: a single one may be wrong."""
 DRIFT_CHANGE = 1.0
-"""By which the rate of a clock may change in a second, m/s."""
+"""Largest change of the rate of a clock in a second, m/s."""
 MILLISECOND = 1e-3 * speed_of_light
 EXACT = 100.0
-"""A step that is not further from whole milliseconds, m, nor than half of what makes a step, has just that size."""
+"""A step within this distance of whole milliseconds, m, is taken for exactly these. The distance is at most half of the
+least step."""
 UNKNOWN = 1000.0
 """1 sigma of the clock after any other step, m."""
 NEIGHBOURS = 10
 """Epochs to either side whose median, with the epoch's own, tells the rate of the clock."""
 FEWEST = 3
-"""Epochs, fewer of which do not tell which of them lies beyond the others."""
+"""Least number of epochs that tells which of them lies beyond the others."""
 
 
 @dataclass(frozen=True, eq=False)

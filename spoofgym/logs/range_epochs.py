@@ -44,13 +44,13 @@ class RangeEpochs:
         started: where a satellite counts for the first time, (E, S).
         code: pseudorange, corrected for all but the receiver's clock and errors, (E, S), m.
         code_sigma: (E, S), m.
-        rate: range rate, corrected likewise, (E, S), m/s.
+        rate: range rate, corrected for all but the receiver's clock and errors, (E, S), m/s.
         rate_sigma: (E, S), m/s.
-        position: of the receiver, by least squares and straight lines between its fixes: latitude rad, longitude rad,
-            height m, (E, 3).
-        velocity: likewise, ENU, (E, 3), m/s.
-        clock: likewise, offset of the receiver's clock as a range, (E,), m.
-        clock_drift: likewise, (E,), m/s.
+        position: of the receiver, latitude rad, longitude rad, height m, (E, 3). It and the next three are fixes by
+            least squares, with straight lines between them.
+        velocity: of the receiver, ENU, (E, 3), m/s.
+        clock: offset of the receiver's clock as a range, (E,), m.
+        clock_drift: its rate, (E,), m/s.
         clock_jump: variance of what a step of the clock leaves in its offset, (E,), m².
         fix: epochs that have a fix, (n,).
         fixes: of these epochs, on the clock of the IMU.

@@ -26,9 +26,9 @@ LEAST_LEFT = 6
 MAX_SIGMA = 20.0
 """A fix with a larger horizontal 1 sigma is none, m."""
 MAX_VELOCITY_SIGMA = 2.0
-"""The same of its velocity, m/s."""
+"""A velocity with a larger 1 sigma is none, m/s."""
 LEAST_SHARE = 0.1
-"""Share of the positions that have a velocity, too, at least; where rates are wrong, hardly any has."""
+"""Least share of positions with a velocity. Where range rates are wrong, hardly any position has one."""
 PASSES = 2
 """Of corrections and fixes, before faults are looked for: a first clock and place, then good ones."""
 

@@ -21,13 +21,13 @@ APART = 3.0
 UNSTATED_SIGMA = 3.5
 """Horizontal 1 sigma of fixes that state none, m."""
 LEAST_SIGMA = 1.0
-"""The same at least, m: a reference may hold for another point of the vehicle."""
+"""Least sigma of fixes that a reference is compared with, m: it may hold for another point of the vehicle."""
 
 
 FAR = 50.0
-"""Distance between a row of the reference and the fixes around it that is told, m, ..."""
+"""Least distance between a row of the reference and the fixes around it of which a warning tells, m."""
 FAR_SHARE = 10.0
-"""... if it is so many times the median distance and the sigma of the fixes, too."""
+"""Least ratio of this distance to the larger of the median distance and the sigma of the fixes."""
 FROZEN = 1.0
 """Time for which a reference may repeat a position of a vehicle that drives, s."""
 MOVING = 0.5

@@ -167,7 +167,7 @@ class RecordedFamily(Immutable, ABC):
 
     @property
     def last(self) -> int:
-        """The last epoch of the game, counted likewise."""
+        """The last epoch of the game, counted as `first`."""
         return len(self.epoch_time) - 1 if self.horizon is None else self.first + self.horizon
 
     @property
@@ -217,7 +217,7 @@ class RecordedFamily(Immutable, ABC):
 
         Args:
             position: of the fixes, and of the truth where no reference tells it, (E, 3).
-            velocity: likewise, (E, 3), ENU, m/s.
+            velocity: of the fixes, and of the truth where no reference tells it, (E, 3), ENU, m/s.
             covariance: the filter's R of fixes, (E, m, m).
         """
         log, time = self.log, self.epoch_time

@@ -143,7 +143,7 @@ class RecordedRanges(RecordedFamily, RangeFamily):
 
         Args:
             position: of the reference at all epochs after the alignment, (E, 3), latitude rad, longitude rad, height m.
-            velocity: likewise, (E, 3), ENU, m/s.
+            velocity: of the reference at these epochs, (E, 3), ENU, m/s.
         """
         ranges = self.ranges
         since = ranges.time - ranges.time[0]

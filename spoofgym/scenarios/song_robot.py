@@ -29,7 +29,7 @@ from spoofgym.specification import spell
 COURT = (13.4, 6.1)
 """Sides of the rectangle, m."""
 SPEED = 0.5
-"""Of the robot, m/s; the spoofer's limit on each axis, too, which is the mean of the paper's slow change."""
+"""Of the robot, m/s. It is also the spoofer's limit on each axis: the mean of the paper's slow change."""
 CORNER = 0.5
 """Radius of the corners, m."""
 START_YAW = math.radians(248.0)

@@ -103,8 +103,8 @@ def gps_24() -> CircularOrbits:
     The slots, the sidereal time of the epoch and a = 26 559.7 km are those of the GPS SPS Performance Standard (2001),
     table 3-1; its almanac (table A2-1) gives the drift of the nodes and is propagated as in IS-GPS-200, with
     n = √(GM / a³). RTCA DO-229, appendix B, uses the same slots. Time is in seconds since 00:00:00 UTC on 1 July 1993.
-    The ground tracks repeat after a sidereal day, but for a drift of about 0.01 degrees a day that the station keeping
-    of real satellites takes out.
+    The ground tracks repeat after a sidereal day. They drift by about 0.01 degrees a day; the station keeping of real
+    satellites takes this drift out.
     """
     node = np.repeat(np.array(NODES) - SIDEREAL_TIME, 4)
     return CircularOrbits(

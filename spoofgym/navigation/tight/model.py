@@ -255,8 +255,8 @@ def tight_dynamics(
 ) -> TightDynamics:
     """The model of truth and filter alike on consecutive epochs.
 
-    A bias whose data sheet gives an instability alone is first-order Gauss-Markov; one with a constant part, too, is a
-    random walk of the instability's driving noise, as in the loosely coupled filter.
+    A bias whose data sheet gives an instability alone is first-order Gauss-Markov; one that also has a constant part is
+    a random walk of the instability's driving noise, as in the loosely coupled filter.
 
     Args:
         inertial: Φ and Q of the navigation states, without the instability of the biases, over the epochs.

@@ -1,4 +1,4 @@
-"""Games of Kujur 2024: a spoofer that replays the true signals, but for its tracking error in the vertical."""
+"""Games of Kujur 2024: a spoofer that replays the true signals with a tracking error in the vertical."""
 
 from __future__ import annotations
 

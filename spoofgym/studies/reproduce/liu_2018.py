@@ -53,7 +53,7 @@ READINGS = (
     "The rate of the GNSS fixes is not printed: 1 Hz, which gives the square roots of P that table 2 implies.",
     "The flight is a figure only: speed, height and the times of the turns follow it, the shapes of the manoeuvres "
     "are ours.",
-    "GNSS noise is white with the filter's own R (3.7, 3.7, 6 m), but for the rows that name ranges: there a fix is "
+    "GNSS noise is white with the filter's own R (3.7, 3.7, 6 m), except in the rows that name ranges: there a fix is "
     "made from the ranges to the 24-slot constellation with the errors of table 1. Those of satellite, ionosphere and "
     "troposphere are constants of each satellite, tracking noise and multipath are white; the paper gives no times.",
     "A value that the paper calls 'about' may be half a unit of its last non-zero digit off.",
