@@ -14,7 +14,7 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.metrics import attacker_score, undetected_error
-from spoofgym.evaluation.monte_carlo import Episodes, play_attack
+from spoofgym.evaluation.monte_carlo import Episodes, watch_attack
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import attacker_row
 from spoofgym.optimum import expected_play
@@ -105,7 +105,7 @@ class Evaluation:
 
     def play(self, attack: Attack, episodes: int) -> Episodes:
         """Games of an attack."""
-        return play_attack(
+        return watch_attack(
             self.scenario,
             attack,
             self.detectors,
@@ -113,7 +113,7 @@ class Evaluation:
             self.seed,
             fidelity=self.fidelity,
             threads=self.threads,
-        )
+        ).together()
 
     def exact(self, policy: LearnedSpoofer) -> float | None:
         """Exact undetected error of a policy whose offsets do not depend on chance, m; else None.

@@ -175,19 +175,3 @@ def watch_attack(
         return SimulationBatch(simulation)
 
     return _join(play(make, _Watch, episodes, seed, BATCH))
-
-
-def play_attack(
-    scenario: Scenario,
-    attack: Attack,
-    detectors: list[Detector],
-    episodes: int,
-    seed: int,
-    *,
-    fidelity: str = "linear",
-    threads: int = 1,
-) -> Episodes:
-    """Games of an attack, as all detectors together saw them; arguments and errors as `watch_attack`."""
-    return watch_attack(
-        scenario, attack, detectors, episodes, seed, fidelity=fidelity, threads=threads
-    ).together()

@@ -81,17 +81,11 @@ class Settings:
         """
         limits.check(
             self,
-            {
-                "lanes": limits.whole(1, limits.MOST_LANES),
+            limits.PPO
+            | {
                 "clean": limits.real(0.0, 1.0),
-                "minibatches": limits.whole(1, 10_000),
-                "epochs": limits.whole(1, 1000),
-                "learning_rate": limits.real(0.0, 1.0),
                 "gamma": limits.real(0.0, 1.0),
-                "gae_lambda": limits.real(0.0, 1.0),
-                "clip_range": limits.real(0.0, 10.0),
                 "entropy": limits.real(0.0, 1e6),
-                "hidden": limits.whole(1, 4096),
                 "imitate": limits.SWITCH,
                 "privileged": limits.SWITCH,
                 "critic_games": limits.whole(0, 10_000),

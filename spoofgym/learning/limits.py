@@ -20,6 +20,18 @@ def real(least: float, most: float) -> tuple[type[float], float, float]:
     return float, least, most
 
 
+PPO = {
+    "lanes": whole(1, MOST_LANES),
+    "minibatches": whole(1, 10_000),
+    "epochs": whole(1, 1000),
+    "learning_rate": real(0.0, 1.0),
+    "gae_lambda": real(0.0, 1.0),
+    "clip_range": real(0.0, 10.0),
+    "hidden": whole(1, 4096),
+}
+"""Of what every PPO learner has."""
+
+
 def check(settings: Any, limits: Mapping[str, tuple[type, float, float]]) -> None:
     """Refuse settings out of their limits.
 

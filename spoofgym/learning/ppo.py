@@ -64,17 +64,11 @@ class Settings:
         """
         limits.check(
             self,
-            {
-                "lanes": limits.whole(1, limits.MOST_LANES),
+            limits.PPO
+            | {
                 "trials": limits.whole(1, 1000),
-                "minibatches": limits.whole(1, 10_000),
-                "epochs": limits.whole(1, 1000),
-                "learning_rate": limits.real(0.0, 1.0),
                 "log_std": limits.real(-20.0, 20.0),
-                "gae_lambda": limits.real(0.0, 1.0),
-                "clip_range": limits.real(0.0, 10.0),
                 "max_grad_norm": limits.real(0.0, 1e6),
-                "hidden": limits.whole(1, 4096),
             },
         )
 

@@ -55,8 +55,7 @@ class FilterTuning:
 
     def initial_sigma(self, grade: ImuGrade) -> Floats:
         """True 1-sigma initial error of the 15 states."""
-        total_bias = np.hypot(grade.bias_sigma, grade.instability_sigma)
-        return np.concatenate([self.attitude_sigma, self.velocity_sigma, self.position_sigma, total_bias])
+        return np.concatenate([self.attitude_sigma, self.velocity_sigma, self.position_sigma, grade.whole_bias_sigma])
 
     def noise_density(self, grade: ImuGrade) -> Floats:
         """The filter's process noise density of the 15 states, (15,), unit²/s.

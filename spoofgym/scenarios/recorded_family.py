@@ -345,7 +345,7 @@ class RecordedFamily(Immutable, ABC):
     @property
     def bias_sigma(self) -> Floats:
         """Data-sheet bias of the IMU grade that the filter believes in, (6,), rad/s and m/s²."""
-        return np.hypot(self.grade.bias_sigma, self.grade.instability_sigma)
+        return self.grade.whole_bias_sigma
 
     def times(self, burn_in: int) -> Floats:
         """Log time of the epochs -burn_in..K, s."""

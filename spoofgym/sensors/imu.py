@@ -74,6 +74,11 @@ class ImuGrade:
         """Stationary sigma of the bias instability, (6,), rad/s and m/s²."""
         return np.repeat([self.gyro_instability * DEGREE_PER_HOUR, self.accelerometer_instability * MICRO_G], 3)
 
+    @property
+    def whole_bias_sigma(self) -> Floats:
+        """Constant and unstable part of a bias together, (6,), rad/s and m/s²."""
+        return np.hypot(self.bias_sigma, self.instability_sigma)
+
 
 GRADES = {
     item.name: item

@@ -9,7 +9,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.matrix import detection_curve, detection_curves, exact_interval, matrix_report, matrix_rows
 from spoofgym.evaluation.metrics import attacker_score
-from spoofgym.evaluation.monte_carlo import NEVER, play_attack, watch_attack
+from spoofgym.evaluation.monte_carlo import NEVER, watch_attack
 from spoofgym.scenarios import make_scenario
 
 UNLIKELY = 1e-8
@@ -27,7 +27,7 @@ def games():
 def test_each_detector_sees_what_it_would_see_alone(games):
     scenario, _, watched = games
     for place, name in enumerate(DETECTORS):
-        alone = play_attack(scenario, make_attack("ramp:0.8"), [make_detector(name)], 300, 5)
+        alone = watch_attack(scenario, make_attack("ramp:0.8"), [make_detector(name)], 300, 5).together()
         seen = watched.of(place)
         np.testing.assert_array_equal(seen.alarm_epoch, alone.alarm_epoch)
         np.testing.assert_array_equal(seen.final_error, alone.final_error)

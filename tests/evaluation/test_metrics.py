@@ -10,7 +10,7 @@ from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import attacker_score, mean_interval, undetected_error
-from spoofgym.evaluation.monte_carlo import NEVER, Episodes, play_attack
+from spoofgym.evaluation.monte_carlo import NEVER, Episodes, watch_attack
 from spoofgym.optimum import best_ramp, expected_play
 from spoofgym.policies.scripted import OffsetSequence, RandomRates
 from spoofgym.scenarios import make_scenario
@@ -69,7 +69,7 @@ def test_monte_carlo_agrees_with_the_exact_play():
     detector = calibrated(make_detector("snapshot"), scenario)
     ramp = best_ramp(scenario.linear_model(), detector.threshold)
     attack = make_attack(f"ramp:{ramp.rate:.9g},direction={ramp.azimuth:.9g}")
-    played = attacker_score(play_attack(scenario, attack, [detector], 4000, 7))
+    played = attacker_score(watch_attack(scenario, attack, [detector], 4000, 7).together())
     survival = float(ramp.outcome.survival)
     deviation = np.sqrt(survival * (1 - survival) / 4000)
     assert abs(1 - played.detection_probability - survival) < 6 * deviation
@@ -84,10 +84,10 @@ def test_attackers_meet_the_same_noise():
     offsets = np.zeros((20, 3))
     offsets[:, 0] = np.linspace(0.1, 3.0, 20)
     detector = make_detector("snapshot:threshold=1e6")
-    clean = play_attack(scenario, make_attack("none"), [detector], 50, 3)
+    clean = watch_attack(scenario, make_attack("none"), [detector], 50, 3).together()
     detector = make_detector("snapshot:threshold=1e6")
     attack = OffsetSequence("sequence", offsets)
-    spoofed = play_attack(scenario, attack, [detector], 50, 3)
+    spoofed = watch_attack(scenario, attack, [detector], 50, 3).together()
     shift = np.linalg.norm(expected_play(scenario.linear_model(), offsets, 25.9).final_error)
     assert np.all(np.abs(spoofed.final_error - clean.final_error) <= shift + 1e-9)
     assert np.std(spoofed.final_error - clean.final_error) > 0
@@ -96,13 +96,13 @@ def test_attackers_meet_the_same_noise():
 def test_offsets_of_another_length_are_refused():
     scenario = make_scenario("liu-flight:horizon=20")
     with pytest.raises(ValueError, match="19 offsets, the game 20 epochs"):
-        play_attack(scenario, OffsetSequence("short", np.zeros((19, 3))), [make_detector("snapshot")], 2, 0)
+        watch_attack(scenario, OffsetSequence("short", np.zeros((19, 3))), [make_detector("snapshot")], 2, 0)
 
 
 def test_random_rates_stay_within_the_limits():
     scenario = make_scenario("liu-flight:horizon=20")
     attack = RandomRates((4.0, 2.0, 1.0))
-    play_attack(scenario, attack, [make_detector("snapshot")], 30, 0)
+    watch_attack(scenario, attack, [make_detector("snapshot")], 30, 0)
     steps = np.diff(attack._offsets, axis=1)
     assert np.all(np.abs(steps) <= np.array([4.0, 2.0, 1.0]) + 1e-12)
     assert np.all(np.abs(steps).max(axis=(0, 1)) > 0.9 * np.array([4.0, 2.0, 1.0]))
@@ -110,4 +110,4 @@ def test_random_rates_stay_within_the_limits():
 
 def test_no_episodes_are_refused():
     with pytest.raises(ValueError, match="episodes must be a whole number, 1 or more, got 0"):
-        play_attack(make_scenario("liu-flight"), make_attack("none"), [make_detector("snapshot")], 0, 0)
+        watch_attack(make_scenario("liu-flight"), make_attack("none"), [make_detector("snapshot")], 0, 0)

@@ -78,6 +78,7 @@ class CredibleFamily(FixFamily):
             self.linear_model,
             self.fix_sigma,
             drift,
+            matched=self.matched,
         )
 
     @kept_by_burn_in

@@ -83,7 +83,7 @@ class TightFamily(RangeFamily):
     @property
     def bias_sigma(self) -> Floats:
         """Data-sheet bias of the IMU, (6,), rad/s and m/s²."""
-        return np.hypot(self.grade.bias_sigma, self.grade.instability_sigma)
+        return self.grade.whole_bias_sigma
 
     @property
     def facts(self) -> FilterFacts:
