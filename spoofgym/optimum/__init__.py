@@ -4,13 +4,14 @@ The way through this package: `survival` (what one epoch costs) · `play` (what 
 one place that computes it) · `response` (the linear maps behind it) · `closed_form`, `ramp`, `bounded` (three
 attackers) · `upper_bound` and `dynamic_programme` (what no attacker can exceed, from above and from below). Against
 other tests: `cumulative` (the sum of the statistics in a window) · `linear_tests` and `zero_alarm` (any set of tests
-that keep the signs of the innovations).
+that keep the signs of the innovations). Against every test: `gain` (what none of them can see).
 """
 
 from spoofgym.optimum.bounded import BoundedOptimum, bounded_optimum
 from spoofgym.optimum.closed_form import ClosedForm, best_budget, noncentrality_optimum
 from spoofgym.optimum.cumulative import cumulative_optimum, missed_magnitude
 from spoofgym.optimum.dynamic_programme import Lattice, dynamic_programme
+from spoofgym.optimum.gain import GameGain, game_gain
 from spoofgym.optimum.linear_tests import LinearTest, ewma, gate, window_mean
 from spoofgym.optimum.play import Outcome, expected_play
 from spoofgym.optimum.ramp import BestRamp, best_ramp
@@ -21,6 +22,7 @@ __all__ = [
     "BestRamp",
     "BoundedOptimum",
     "ClosedForm",
+    "GameGain",
     "Lattice",
     "LinearTest",
     "Outcome",
@@ -33,6 +35,7 @@ __all__ = [
     "dynamic_programme",
     "ewma",
     "expected_play",
+    "game_gain",
     "gate",
     "missed_magnitude",
     "noncentrality_optimum",

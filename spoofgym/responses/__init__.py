@@ -8,7 +8,7 @@ from spoofgym.responses.ardupilot import ArduPilotClip, ArduPilotGlitch
 from spoofgym.responses.backtrack import ExcludeAndBacktrack
 from spoofgym.responses.base import Response
 from spoofgym.responses.constant_velocity import ConstantVelocityStart
-from spoofgym.responses.exclude import AlwaysUse, Exclude, Latch
+from spoofgym.responses.exclude import AlwaysExclude, AlwaysUse, Exclude, Latch
 from spoofgym.responses.exclude_satellites import ExcludeSatellites
 from spoofgym.responses.onset_depth import OnsetDepth
 from spoofgym.responses.px4 import Px4Auto, Px4DeadReckoning
@@ -16,6 +16,7 @@ from spoofgym.specification import build
 
 RESPONSES: dict[str, Callable[..., Response]] = {
     "always-use": AlwaysUse,
+    "always-exclude": AlwaysExclude,
     "exclude": Exclude,
     "latch": Latch,
     "exclude-satellites": ExcludeSatellites,

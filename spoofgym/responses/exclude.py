@@ -1,4 +1,4 @@
-"""The simplest responses: use every fix, leave fixes out while an alarm lasts, or leave GNSS out for good."""
+"""The simplest responses: use every fix or none, leave fixes out while an alarm lasts, or leave GNSS out for good."""
 
 from __future__ import annotations
 
@@ -24,6 +24,21 @@ class AlwaysUse(Response):
     def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
         """Use it."""
         return Decision(np.ones_like(alarm))
+
+
+class AlwaysExclude(Response):
+    """No fix of the game is used, whatever the detectors say: the yardstick of a defender who trusts nobody."""
+
+    demands = Demands(excludes=True)
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this response."""
+        return "always-exclude"
+
+    def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
+        """Leave it out."""
+        return Decision(np.zeros_like(alarm))
 
 
 class Exclude(ExcludingResponse):

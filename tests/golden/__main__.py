@@ -2,10 +2,11 @@
 
     python -m tests.golden make runs/golden               # before a change, on this machine
     python -m tests.golden compare runs/golden            # after it: bit for bit
-    python -m tests.golden commit --kinds duels           # the arrays of the repository, and their tolerances
+    python -m tests.golden commit                         # new arrays of the repository, and their tolerances
 
-`commit` plays every episode again in other arithmetic (code of OpenBLAS, NumPy and numba for older processors) and with
-all random numbers moved by one unit in the last place, and allows each quantity ten times the largest difference.
+Arrays that are in the repository stay as they are; delete a file to make its arrays anew. `commit` plays every new
+episode again in other arithmetic (code of OpenBLAS, NumPy and numba for older processors) and with all random numbers
+moved by one unit in the last place, and allows each quantity ten times the largest difference.
 """
 
 from __future__ import annotations
@@ -80,28 +81,39 @@ def compare(folder: Path, kinds: Sequence[str]) -> int:
 
 
 def commit(kinds: Sequence[str]) -> None:
-    """Make the arrays of some kinds for the repository and measure their tolerances."""
-    make(store.FOLDER, kinds)
-    made = {name for kind in kinds for name in store.ALL_KINDS[kind]()}
-    allowed = {name: gaps for name, gaps in store.tolerances().items() if name not in made}
+    """Make the arrays of new episodes of some kinds for the repository and measure their tolerances."""
+    new = {kind: _make_new(kind) for kind in kinds}
+    everyone = {name for episodes in store.KINDS.values() for name in episodes()}
+    made = {name for names in new.values() for name in names}
+    allowed = {name: gaps for name, gaps in store.tolerances().items() if name in everyone - made}
     for label, variables in VARIATIONS.items():
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as cache:
-            command = [sys.executable, "-m", "tests.golden", "make", folder, "--kinds", *kinds]
+            command = [sys.executable, "-m", "tests.golden", "make", folder, "--kinds", *(k for k in kinds if new[k])]
             # thresholds, too, are calibrated in this arithmetic
             subprocess.run(command, env={**os.environ, **variables, "SPOOFGYM_CACHE": cache}, check=True)
-            largest = _widen(allowed, Path(folder), kinds)
+            largest = _widen(allowed, Path(folder), new)
         print(f"{label}: largest difference {largest:.3g}")
     kept = {name: {key: float(f"{gap:.2g}") for key, gap in gaps.items()} for name, gaps in sorted(allowed.items())}
     store.TOLERANCES.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n")
 
 
-def _widen(allowed: dict[str, dict[str, float]], folder: Path, kinds: Sequence[str]) -> float:
+def _make_new(kind: str) -> list[str]:
+    """Play the episodes of a kind that the repository does not hold, and forget those that are played no more."""
+    held = store.read(store.FOLDER, kind) if (store.FOLDER / f"{kind}.npz").exists() else {}
+    episodes = store.KINDS[kind]()
+    new = [name for name in episodes if name not in held]
+    if new or held.keys() - episodes.keys():
+        store.write(store.FOLDER, kind, {name: held.get(name) or play() for name, play in episodes.items()})
+    return new
+
+
+def _widen(allowed: dict[str, dict[str, float]], folder: Path, new: dict[str, list[str]]) -> float:
     """Allow what a variation made of the episodes; the largest difference of all."""
     largest = 0.0
-    for kind in kinds:
-        varied = store.read(folder, kind)
-        for name, arrays in store.read(store.FOLDER, kind).items():
-            for key, array in arrays.items():
+    for kind in (kind for kind, names in new.items() if names):
+        varied, held = store.read(folder, kind), store.read(store.FOLDER, kind)
+        for name in new[kind]:
+            for key, array in held[name].items():
                 gap = store.distance(array, varied[name][key])
                 largest = max(largest, gap)
                 if not np.isfinite(gap):
