@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from spoofgym.arrays import Floats
-from spoofgym.navigation.error_model import NUM_STATES
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.mean_maps import check_position_fix, offsets_of
 from spoofgym.optimum.play import HORIZONTAL
@@ -42,7 +41,7 @@ def error_map(model: LinearModel) -> Floats:
         model: the filter along the scenario.
     """
     num_epochs, m = model.num_epochs, model.dimension
-    error = np.zeros((NUM_STATES, num_epochs * m))
+    error = np.zeros((model.num_states, num_epochs * m))
     rows = np.empty((num_epochs, 2, num_epochs * m))
     for k in range(1, num_epochs + 1):
         error[:, : k * m] = model.transition[k] @ error[:, : k * m]
