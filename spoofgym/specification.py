@@ -95,6 +95,12 @@ def spell(name: str, value: object = None, **options: object) -> str:
     return str(Specification(name, None if value is None else write(value), written))
 
 
+def spell_changed(name: str, factory: Callable[..., object], **options: object) -> str:
+    """Write the specification of a part from the options of its factory; those that have their default are left out."""
+    parameters = inspect.signature(factory).parameters
+    return spell(name, **{key: value for key, value in options.items() if value != parameters[key].default})
+
+
 def write(content: object) -> str:
     """A value as it is spelled after ``key=``."""
     if isinstance(content, bool):

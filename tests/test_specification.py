@@ -4,7 +4,7 @@ from typing import Optional
 
 import pytest
 
-from spoofgym.specification import Specification, build, spell
+from spoofgym.specification import Specification, build, spell, spell_changed
 
 
 class Part:
@@ -117,3 +117,9 @@ def test_spell_leaves_none_out_and_reads_back_exactly():
     assert spell("none") == "none"
     for number in (0.1 + 0.2, 1.0 / 3.0, 1e-5, 1e300, -2.5, 123456.789):
         assert float(Specification.parse(spell("x", number)).value) == number
+
+
+def test_spell_changed_leaves_defaults_of_the_factory_out():
+    given = {"size": 2.0, "count": 1, "flag": True, "label": None}
+    assert spell_changed("part", Part, **given) == "part:size=2,flag=true"
+    assert spell_changed("part", Part, **given | {"count": 3, "flag": False}) == "part:size=2,count=3"

@@ -20,7 +20,7 @@ from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import MOST_EPOCHS, NOISE_FACTORS
 from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.receiver import Receiver
-from spoofgym.specification import spell
+from spoofgym.specification import spell_changed
 from spoofgym.trajectory import Accelerate, Straight, Trajectory, Turn, fly
 from spoofgym.truth import SimulatedTruth
 
@@ -93,14 +93,15 @@ def foi_drive(
     bias_states = validation.boolean(owner, "bias_states", bias_states)
     white = receiver == "white"
     sigma = (1.0, 1.0, 1.0) if white else (3.0, 3.0, 3.0)
-    name = spell(
+    name = spell_changed(
         owner,
-        horizon=None if horizon == 230 else horizon,
-        onset=None if onset == 20.0 else onset,
-        imu=None if imu == "fog" else imu,
-        receiver=None if white else receiver,
-        process_noise=None if process_noise == 1.0 else process_noise,
-        bias_states=None if bias_states else bias_states,
+        foi_drive,
+        horizon=horizon,
+        onset=onset,
+        imu=imu,
+        receiver=receiver,
+        process_noise=process_noise,
+        bias_states=bias_states,
     )
     fixes = Receiver(
         white_sigma=(1.0, 1.0, 1.0) if white else (0.1, 0.1, 0.1),

@@ -25,7 +25,7 @@ from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import range_fix_along
 from spoofgym.sensors.ranging import KUJUR
 from spoofgym.sensors.receiver import ZERO, Receiver
-from spoofgym.specification import spell
+from spoofgym.specification import spell_changed
 from spoofgym.trajectory import Straight, Trajectory, fly
 from spoofgym.truth import SimulatedTruth
 from spoofgym.validation import written
@@ -101,15 +101,16 @@ def kujur_flight(
     )
     usual = DRAG_OFF_RATES[coupling]
     fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
-    name = spell(
+    name = spell_changed(
         owner,
-        coupling=None if coupling == "tight" else coupling,
-        horizon=None if horizon == 120 else horizon,
-        onset=None if onset == 900.0 else onset,
-        hour=None if hour == HOUR else hour,
-        imu=None if imu == "kujur-navigation" else imu,
-        horizontal_alert_limit=None if limits[0] == ALERT_LIMITS[0] else limits[0],
-        vertical_alert_limit=None if limits[1] == ALERT_LIMITS[1] else limits[1],
+        kujur_flight,
+        coupling=coupling,
+        horizon=horizon,
+        onset=onset,
+        hour=hour,
+        imu=imu,
+        horizontal_alert_limit=limits[0],
+        vertical_alert_limit=limits[1],
         drag_off_rate=None if fastest == usual else fastest,
     )
     truth = SimulatedTruth(

@@ -23,7 +23,7 @@ from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import MASK, range_fix_along
 from spoofgym.sensors.ranging import LIU
 from spoofgym.sensors.receiver import RATES, ZERO, Receiver
-from spoofgym.specification import spell
+from spoofgym.specification import spell_changed
 from spoofgym.trajectory import Accelerate, Climb, Straight, Trajectory, Turn, fly
 from spoofgym.truth import SimulatedTruth
 from spoofgym.validation import written
@@ -134,20 +134,21 @@ def liu_flight(
             f"{owner}: markov_sigma and markov_time go together, got {written(markov_sigma)} m with "
             f"{written(markov_time)} s"
         )
-    name = spell(
+    name = spell_changed(
         owner,
-        horizon=None if horizon == 120 else horizon,
-        onset=None if onset == 800.0 else onset,
-        rate=None if rate == 1.0 else rate,
-        imu=None if imu == "navigation" else imu,
-        markov_sigma=markov_sigma or None,
-        markov_time=markov_time or None,
-        sigma=None if sigma == 3.7 else sigma,
-        noise=None if noise == "white" else noise,
-        coupling=None if coupling == "loose" else coupling,
+        liu_flight,
+        horizon=horizon,
+        onset=onset,
+        rate=rate,
+        imu=imu,
+        markov_sigma=markov_sigma,
+        markov_time=markov_time,
+        sigma=sigma,
+        noise=noise,
+        coupling=coupling,
         drag_off_rate=None if fastest == usual else fastest,
-        horizontal_alert_limit=None if limits[0] == ALERT_LIMITS[0] else limits[0],
-        vertical_alert_limit=None if limits[1] == ALERT_LIMITS[1] else limits[1],
+        horizontal_alert_limit=limits[0],
+        vertical_alert_limit=limits[1],
     )
     if coupling == "tight" and (noise != "white" or coloured or sigma != 3.7):
         raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")

@@ -18,7 +18,7 @@ from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import SPEEDS
 from spoofgym.sensors.imu import grade
 from spoofgym.sensors.receiver import RATES, Receiver
-from spoofgym.specification import spell
+from spoofgym.specification import spell_changed
 from spoofgym.trajectory import Straight, Trajectory, fly
 from spoofgym.truth import SimulatedTruth
 
@@ -99,12 +99,13 @@ def shadmehri_flight(
     guard = default.guard if guard is None else validation.text(owner, "guard", guard)
     first = 2.0 / rate
     start = first if onset is None else validation.between(owner, "onset", onset, first, DURATION - 1.0 / rate)
-    name = spell(
+    name = spell_changed(
         owner,
-        filter=None if filter == "common" else filter,
-        noise=None if white else noise,
-        rate=None if rate == 10.0 else rate,
-        speed=None if speed == 200.0 else speed,
+        shadmehri_flight,
+        filter=filter,
+        noise=noise,
+        rate=rate,
+        speed=speed,
         onset=None if start == first else start,
         window=None if window == default.window else window,
         guard=None if guard == default.guard else guard,

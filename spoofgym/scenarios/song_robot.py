@@ -24,7 +24,7 @@ from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G
 from spoofgym.sensors.odometer import GRADES, Odometer, PlanarMotion, odometer_grade
 from spoofgym.sensors.receiver import Receiver
-from spoofgym.specification import spell
+from spoofgym.specification import spell_changed
 
 COURT = (13.4, 6.1)
 """Sides of the rectangle, m."""
@@ -157,16 +157,17 @@ def song_robot(
     if auxiliary != "credited" and credit != 5:
         raise ValueError(f"{owner}: credit {credit} is of auxiliary 'credited', got auxiliary {auxiliary!r}")
     encoders, receiver = Odometer(), _receiver(noise, sigma)
-    name = spell(
+    name = spell_changed(
         owner,
-        data=None if data == "rectangle" else data,
-        noise=None if noise == "markov" else noise,
-        sigma=None if sigma == SIGMA else sigma,
-        odometer=None if odometer == "set-a" else odometer,
-        auxiliary=None if auxiliary == "anchored" else auxiliary,
-        credit=None if credit == 5 else rule.credit,
-        horizon=None if horizon == 300 else horizon,
-        onset=None if onset == 0.0 else onset,
+        song_robot,
+        data=data,
+        noise=noise,
+        sigma=sigma,
+        odometer=odometer,
+        auxiliary=auxiliary,
+        credit=rule.credit,
+        horizon=horizon,
+        onset=onset,
     )
     tuning = CredibleTuning(
         step=encoders.step,
