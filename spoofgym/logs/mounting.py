@@ -105,9 +105,10 @@ def find_delay(
         ValueError: too little motion, no turns, or a delay of a second or more.
     """
     blame = f"{owner}: {failure}"
+    turned, pushed = _running_integral(imu_time, angular_rate), _running_integral(imu_time, specific_force)
     correlation = []
     for delay in DELAYS:
-        intervals = _intervals(blame, imu_time, angular_rate, specific_force, fix_time - delay, velocity)
+        intervals = _intervals(blame, imu_time, turned, pushed, fix_time - delay, velocity)
         correlation.append(_yaw_correlation(intervals, _direction(intervals.specific_force[intervals.moving])))
     best = int(np.argmax(correlation))
     _check_yaw(blame, correlation[best])
@@ -131,7 +132,8 @@ def find_mounting(
             rate that does not fit the course.
     """
     blame = f"{owner}: {NO_MOUNTING}"
-    intervals = _intervals(blame, imu_time, angular_rate, specific_force, fix_time, velocity)
+    turned, pushed = _running_integral(imu_time, angular_rate), _running_integral(imu_time, specific_force)
+    intervals = _intervals(blame, imu_time, turned, pushed, fix_time, velocity)
     moving = intervals.moving
     rotation, heading_sigma = _rotation(intervals)
     if not heading_sigma <= MAX_HEADING_SIGMA:
@@ -157,8 +159,9 @@ def _check_yaw(blame: str, correlation: float) -> None:
 
 
 def _intervals(
-    blame: str, imu_time: Floats, angular_rate: Floats, specific_force: Floats, fix_time: Floats, velocity: Floats
+    blame: str, imu_time: Floats, turned: Floats, pushed: Floats, fix_time: Floats, velocity: Floats
 ) -> _Intervals:
+    """Of consecutive fixes; ``turned`` and ``pushed`` are the running integrals of angular rate and specific force."""
     begin, end = fix_time[:-1], fix_time[1:]
     step = end - begin
     used = (step <= MAX_INTERVAL) & (begin >= imu_time[0]) & (end <= imu_time[-1])
@@ -178,15 +181,24 @@ def _intervals(
         forward=(np.diff(speed) / step)[used],
         right=(0.5 * (speed[:-1] + speed[1:]) * course_rate)[used],
         course_rate=course_rate[used],
-        angular_rate=interval_means(imu_time, angular_rate, begin[used], end[used]),
-        specific_force=interval_means(imu_time, specific_force, begin[used], end[used]),
+        angular_rate=_means(imu_time, turned, begin[used], end[used]),
+        specific_force=_means(imu_time, pushed, begin[used], end[used]),
     )
 
 
 def interval_means(time: Floats, samples: Floats, begin: Floats, end: Floats) -> Floats:
     """Of the straight lines between the samples, over each interval, (n, 3)."""
+    return _means(time, _running_integral(time, samples), begin, end)
+
+
+def _running_integral(time: Floats, samples: Floats) -> Floats:
+    """Of the straight lines between the samples (n, 3), from the first sample to each, (n, 3)."""
     areas = 0.5 * (samples[1:] + samples[:-1]) * np.diff(time)[:, None]
-    integral = np.vstack([np.zeros(3), np.cumsum(areas, axis=0)])
+    return np.vstack([np.zeros(3), np.cumsum(areas, axis=0)])
+
+
+def _means(time: Floats, integral: Floats, begin: Floats, end: Floats) -> Floats:
+    """What `interval_means` gives, from the running integral."""
     change = [np.interp(end, time, integral[:, a]) - np.interp(begin, time, integral[:, a]) for a in range(3)]
     return np.stack(change, axis=1) / (end - begin)[:, None]
 

@@ -10,6 +10,7 @@ known.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
@@ -113,11 +114,17 @@ def carry(
 
 def settled_covariance(tuning: CredibleTuning) -> Floats:
     """[pp, pv, vv] after a fix where every fix is used, (3,), m², m²/s, m²/s²."""
+    return np.array(_settled(tuning))
+
+
+@lru_cache(maxsize=128)
+def _settled(tuning: CredibleTuning) -> tuple[float, ...]:
+    """Many simulations begin with one tuning, and it takes thousands of steps."""
     covariance = np.array([tuning.fix_sigma**2, 0.0, 1.0])
     for _ in range(SETTLING):
         _predict_epoch(tuning, covariance)
         update_covariance(tuning.fix_sigma**2, covariance)
-    return covariance
+    return tuple(covariance.tolist())
 
 
 def _predict_epoch(tuning: CredibleTuning, covariance: Floats) -> None:
