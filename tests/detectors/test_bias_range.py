@@ -5,6 +5,7 @@ import pytest
 
 from spoofgym.attacks import make_attack
 from spoofgym.calibration import calibrated, measure_arl0
+from spoofgym.calibration import thresholds as calibration
 from spoofgym.detectors import BiasRange, make_detector
 from spoofgym.detectors import at_arl0 as with_arl0
 from spoofgym.navigation.facts import FilterFacts
@@ -79,11 +80,14 @@ def test_names():
     assert with_arl0("bias-range:factor=3", 1000.0) == "bias-range:factor=3"
 
 
-def test_the_factor_can_be_calibrated_on_clean_games():
+def test_the_factor_can_be_calibrated_on_clean_games(monkeypatch, tmp_path):
     """The threshold is a factor, and attains the ARL0 in other clean games of the scenario.
 
     At least 100 first alarms decide it and about 300 measure; 6 deviations of both counts: 2e-9.
     """
+    monkeypatch.setenv("SPOOFGYM_CACHE", str(tmp_path))
+    monkeypatch.setattr(calibration, "_KNOWN", {})
+    monkeypatch.setattr(calibration, "RUNS", 1000)
     scenario = make_scenario("liu-flight:horizon=60")
     detector = calibrated(make_detector("bias-range:arl0=300"), scenario)
     other = simulated_statistics(scenario, "linear")

@@ -114,7 +114,7 @@ def test_fast_attacks_are_seen(pull):
 @pytest.mark.parametrize("direction", ["up", "horizontal"])
 def test_the_error_is_within_the_protection_level_or_there_is_an_alarm(direction, rate):
     """P(|error| > PL without an alarm) <= 2 P_MD at an epoch, spoofed or not; within the length of the windows."""
-    runs, p_md = 3000, 0.05
+    runs, p_md = 1500, 0.05
     detector = SeparationBank(40, direction, p_md=p_md)
     simulation = Simulation(FLIGHT, None, [detector], None, runs, 11)
     simulation.reset()

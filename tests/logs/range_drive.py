@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,7 @@ class Clock:
         return total
 
 
+@cache
 def drive(turns: int) -> Trajectory:
     """A drive of ``turns`` times 35 s."""
     manoeuvres = []
@@ -128,6 +130,19 @@ def write_drive(
     return truth
 
 
+_FLIGHTS: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
+"""What `flights` gives, by the drive's length and the first sample: drives differ in their clocks and noise."""
+
+
+def _true_flights(
+    folder: Path, truth: Trajectory, index: np.ndarray, true: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    key = (truth.num_steps, int(index[0]))
+    if key not in _FLIGHTS:
+        _FLIGHTS[key] = flights(folder, truth.position[index], true)
+    return _FLIGHTS[key]
+
+
 def _write_ranges(
     folder: Path,
     truth: Trajectory,
@@ -141,8 +156,10 @@ def _write_ranges(
     write_ephemeris(folder / "ephemeris.csv")
     numbers = read_csv(folder / "ephemeris.csv").satellites
     true = FIRST + truth.time[index] + DELAY
-    ranges, elevation = flights(folder, truth.position[index], true)
-    before, after = (flights(folder, truth.position[index + k], true + k / RATE)[0] for k in (-HALF, HALF))
+    (ranges, elevation), (before, _), (after, _) = (
+        _true_flights(folder, truth, index + k, true + k / RATE) for k in (0, -HALF, HALF)
+    )
+    ranges = ranges.copy()
     rates = (after - before) * RATE / (2 * HALF) + oscillator.drift
     stepped = oscillator.stepped(len(index))
     clock = oscillator.offset + oscillator.drift * np.arange(len(index)) + stepped

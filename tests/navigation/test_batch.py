@@ -75,12 +75,12 @@ def left_out(k, num_runs):
 @pytest.mark.parametrize(("scenario", "fidelity", "demands"), NAVIGATORS)
 def test_results_do_not_depend_on_threads(scenario, fidelity, demands, monkeypatch):
     decide = taken_back if demands.history else every
-    family, navigator = built(scenario, fidelity, demands, 600)
+    family, navigator = built(scenario, fidelity, demands, 200)
     monkeypatch.setattr(type(navigator), "grain", 1)
     monkeypatch.setattr(type(navigator), "carry_grain", 1)
     alone, arrays = play(family, navigator, decide)
     for threads in (2, 8):
-        family, navigator = built(scenario, fidelity, demands, 600, threads)
+        family, navigator = built(scenario, fidelity, demands, 200, threads)
         several, others = play(family, navigator, decide)
         for one, other in zip(several, alone, strict=True):
             np.testing.assert_array_equal(one, other)

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.xdist_group("consistency")  # one worker: the fixtures 
 FALSE_FAILURE = 2e-8
 ONSET, HORIZON = 140.0, 60
 """Into a turn that begins at 150 s, with the warm-up before it."""
-RUNS = {"linear": 3000, "strapdown": 200}
+RUNS = {"linear": 2000, "strapdown": 200}
 PARTS = {"all": slice(0, 15), "attitude": slice(0, 3), "velocity": slice(3, 6), "position": slice(6, 9)}
 
 

@@ -226,10 +226,10 @@ def test_a_new_satellite_brings_new_errors_and_an_empty_slot_has_none():
 
 
 def test_code_variance_is_that_of_what_is_drawn():
-    """8000 runs of five elevations, all errors at once; chi-square, 1e-9 each of ten."""
+    """4000 runs of five elevations, all errors at once; chi-square, 1e-9 each of ten."""
     for errors in (KUJUR, LIU):
         codes = np.array(
-            [draw_range_errors(errors, sky(1, ELEVATIONS), np.random.default_rng(i)).code[0] for i in range(8000)]
+            [draw_range_errors(errors, sky(1, ELEVATIONS), np.random.default_rng(i)).code[0] for i in range(4000)]
         )
         low, high = band(len(codes))
         ratio = np.mean(codes**2, axis=0) / code_variance(errors, ELEVATIONS)

@@ -79,10 +79,9 @@ def test_shares_at_an_epoch_are_those_that_the_levels_promise():
             assert stats.binom.sf(int(misled.sum()) - 1, runs, 2.0 * p_md) > FALSE_FAILURE
 
 
-@pytest.mark.slow
 def test_a_climb_that_outlasts_the_windows_misleads_the_bank_too():
     """The coasting of 30 s ago has been spoofed as well; all but a few runs are misled, we ask for half."""
-    result = play(SLOWER, 20, 40).result(BANK)
+    result = play(SLOWER, 20, 40, 2 * HORIZON).result(BANK)
     assert result.misled.events >= 10
 
 

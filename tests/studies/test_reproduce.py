@@ -16,7 +16,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.foi_drive import foi_trajectory
 from spoofgym.simulation import Simulation
 from spoofgym.studies.reproduce import foi_games, foi_r_5687, liu_2018, rows
-from spoofgym.studies.reproduce.__main__ import main
+from spoofgym.studies.reproduce.__main__ import PAPERS, main
 from spoofgym.studies.reproduce.foi_azimuth import DEGREES, RADIANS, largest_offset, printed_offsets
 from spoofgym.studies.reproduce.foi_tables import ATTACKS, TABLE_3, TABLE_5, TABLE_9, Attacked
 from spoofgym.studies.reproduce.rows import NEVER, Published, Reproduction, Row, number_verdict, rounded
@@ -255,11 +255,15 @@ def check_report(report: Reproduction) -> dict[str, Row]:
     return items
 
 
+ON_LIU = pytest.mark.xdist_group("liu rows")  # one worker: the report is made once
+
+
 @pytest.fixture(scope="module")
 def liu():
     return liu_2018.reproduce(4, 0, True)
 
 
+@ON_LIU
 def test_liu_rows(liu):
     items = check_report(liu)
     relative = [row for item, row in items.items() if item.startswith("relative change")]
@@ -279,6 +283,7 @@ def test_liu_rows(liu):
     assert "unspoofed run 0 m" in gain.reason, "backtracking to before the onset leaves nothing of the attack"
 
 
+@ON_LIU
 def test_liu_rows_on_fixes_from_ranges(liu):
     """R stands for errors that stay: without an attack the bound is broken, and slow ramps are not seen."""
     items = {row.item: row for row in liu.rows if row.item.startswith("ranges, ")}
@@ -324,7 +329,9 @@ def test_command_writes_json_alone_to_stdout(capsys):
     assert "quick" in captured.err
 
 
-def test_tables_fit_100_columns_and_lose_nothing(capsys, tmp_path):
+@ON_LIU
+def test_tables_fit_100_columns_and_lose_nothing(liu, capsys, tmp_path, monkeypatch):
+    monkeypatch.setitem(PAPERS, "liu-2018", lambda runs, seed, quick: liu)
     path = tmp_path / "new" / "rows.json"
     assert main(["liu-2018", "--quick", "--json", str(path)]) == 0
     out = capsys.readouterr().out

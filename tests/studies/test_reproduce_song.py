@@ -10,6 +10,7 @@ from spoofgym.studies.reproduce import song_2021
 from spoofgym.studies.reproduce.song_2021 import ACNA, CLEAN, EKF, GNSS, JUMPS, MIX, SLOW, TABLES, drive, latency
 from spoofgym.studies.reproduce.tracks import Tracks, play
 
+pytestmark = pytest.mark.xdist_group("song")  # one worker: the drives are made once
 RUNS = 40
 
 
@@ -68,8 +69,9 @@ def test_the_jump_test_alone_is_an_epoch_later_than_both(drives):
     assert np.median(latency(drives.jump_test["set-a"], 50.0, 100.0)) == 2.0
 
 
-def test_rows_have_every_figure_of_tables_3_to_7():
-    report = song_2021.reproduce(2, 0, quick=True)
+def test_rows_have_every_figure_of_tables_3_to_7(drives, monkeypatch):
+    monkeypatch.setattr(song_2021, "drive", lambda runs, seed: drives)
+    report = song_2021.reproduce(RUNS, 0, quick=True)
     assert report.paper == "song-2021"
     printed = [row.paper_value for row in report.rows]
     for _, lines in TABLES.values():

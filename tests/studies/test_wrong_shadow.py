@@ -158,7 +158,7 @@ def test_evaluation_replaces_the_shadow(folder, evaluation, capsys):
 
 def test_training_with_a_wrong_shadow_keeps_it(tmp_path):
     out = tmp_path / "run"
-    arguments = ["--scenario", SCENARIO, "--shadow", WIDE, "--steps", "5000", "--threads", "1", "--out", str(out)]
+    arguments = ["--scenario", SCENARIO, "--shadow", WIDE, "--steps", "300", "--threads", "1", "--out", str(out)]
     assert spoofer.main(arguments) == 0
     assert json.loads((out / CONFIG_FILE).read_text())["environment"]["shadow"] == WIDE
     assert LearnedSpoofer.load(out).configuration["shadow"] == WIDE

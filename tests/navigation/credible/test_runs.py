@@ -171,11 +171,11 @@ def test_the_filter_lags_as_the_papers_does(sigma):
 
 
 def test_a_standing_start_is_stationary():
-    """Error and receiver noise of 4000 runs that stand still, at epoch 0 and 100 epochs later.
+    """Error and receiver noise of 2000 runs that stand still, at epoch 0 and 100 epochs later.
 
     A correct variance leaves its interval in 1e-8 of the cases.
     """
-    runs = 4000
+    runs = 2000
     simulation = Simulation(make_scenario("song-robot:data=static,odometer=table-1"), None, (), None, runs, 0)
     simulation.reset()
     factor = simulation.scenario.family.start_factor
