@@ -15,6 +15,8 @@ from spoofgym.envs.vector import DefenderVectorEnv
 
 ID = "spoofgym/Defender-v0"
 SHORT = "foi-drive:horizon=25"
+STEPS = 60
+"""Two games of each lane, a part of a third, and a reset in mid-game, which the checker does at step 50."""
 DETECTORS = ("snapshot", "signed-mean:n=5,p_fa=1e-2", "windowed:n=20,threshold=114")
 
 
@@ -28,22 +30,20 @@ def mostly_use(vector: VectorEnv) -> np.ndarray:
 @pytest.mark.parametrize(
     "arguments",
     [
-        {},
-        {"fidelity": "strapdown", "num_steps": 60},
+        {"fidelity": "strapdown", "scenario": "foi-drive:horizon=22"},
         {"attacks": "held-out", "clean": 0.0, "outage": 1.0, "multipath": 1.0},
-        {"attacks": ("ramp:2,onset=25", "jump"), "threads": 2},
+        {"attacks": ("ramp:2,onset=25", "jump"), "threads": 2, "max_episode_steps": 10},
         {"scenario": "foi-drive:horizon=25,receiver=foi,onset=40"},
-        {"max_episode_steps": 10},
     ],
     ids=str,
 )
 def test_equal_to_single_environments(arguments: dict[str, Any]) -> None:
     given: dict[str, Any] = {"scenario": SHORT, "detectors": DETECTORS} | arguments
-    steps, limit = given.pop("num_steps", 120), given.pop("max_episode_steps", None)
+    limit = given.pop("max_episode_steps", None)
     check_vector_env(
         lambda num_envs, mode: DefenderVectorEnv(num_envs, autoreset_mode=mode, max_episode_steps=limit, **given),
         lambda: gym.make(ID, max_episode_steps=limit, **given),
-        num_steps=steps,
+        num_steps=STEPS,
         sample_actions=mostly_use,
     )
 
@@ -83,7 +83,7 @@ def test_adapter_is_bit_equal_with_dummy_vec_env() -> None:
     np.testing.assert_array_equal(ours.reset(), theirs.reset())
     rng = np.random.default_rng(1)
     ends = 0
-    for _ in range(200):
+    for _ in range(80):
         actions = rng.integers([2, 5], size=(4, 2))
         one, other = ours.step(actions), theirs.step(actions)
         for a, b in zip(one[:3], other[:3], strict=True):
@@ -93,4 +93,4 @@ def test_adapter_is_bit_equal_with_dummy_vec_env() -> None:
             np.testing.assert_array_equal(one[3][lane]["terminal_observation"], other[3][lane]["terminal_observation"])
             assert one[3][lane]["TimeLimit.truncated"] == other[3][lane]["TimeLimit.truncated"]
             assert one[3][lane]["mean_error"] == other[3][lane]["mean_error"]
-    assert ends == 32
+    assert ends == 12

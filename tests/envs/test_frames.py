@@ -107,7 +107,7 @@ def test_vector_form_equals_single_environments(arguments: dict[str, Any]) -> No
     check_vector_env(
         lambda num_envs, mode: SpooferVectorEnv(num_envs, autoreset_mode=mode, max_episode_steps=limit, **arguments),
         lambda: gym.make(ID, max_episode_steps=limit, **arguments),
-        num_steps=60,
+        num_steps=30,
         sample_actions=slow_or_fast,
     )
 

@@ -35,8 +35,7 @@ Under = Callable[[float, float], Scenario]
 # --- both environments ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scenario", [KUJUR, LIU])
-@pytest.mark.parametrize("fidelity", ["linear", "strapdown"])
+@pytest.mark.parametrize(("scenario", "fidelity"), [(KUJUR, "linear"), (LIU, "strapdown")])
 def test_checkers_of_gymnasium_and_sb3(scenario: str, fidelity: str) -> None:
     spoofer: dict[str, Any] = {"knowledge": "full", "frames": 2, "tracking_sigma": 0.1}
     watched: dict[str, Any] = {"detectors": ("snapshot", "separation-bank"), "attacks": "ramp:0.5"}

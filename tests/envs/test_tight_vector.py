@@ -20,6 +20,8 @@ SPOOFER, DEFENDER = "spoofgym/Spoofer-v0", "spoofgym/Defender-v0"
 KUJUR = "kujur-flight:horizon=40,onset=60,drag_off_rate=4"
 LIU = "liu-flight:horizon=40,onset=60,coupling=tight,drag_off_rate=4"
 SHORT = "kujur-flight:horizon=6,onset=60"
+STEPS = 14
+"""Two games of six epochs, and the beginning of a third."""
 DEAF = "snapshot:threshold=1e9"
 SKIES = [(4.0, 5.0), (8.5, 15.0), (9.5, 25.0), (10.7, 20.0)]
 QUIET: dict[str, Any] = {"attacks": "none", "outage": 0.0, "multipath": 0.0}
@@ -49,17 +51,17 @@ def mostly_use(vector: VectorEnv) -> np.ndarray:
         {"knowledge": "full", "detector": ("snapshot", "separation-bank:n=10"), "tracking_sigma": 0.02},
         {"scenario": "liu-flight:horizon=6,onset=60,coupling=tight", "frames": 2, "max_episode_steps": 4},
         {"on_alarm": "respond", "response": "exclude-satellites", "knowledge": "blind"},
-        {"fidelity": "strapdown", "num_steps": 14, "threads": 2},
+        {"fidelity": "strapdown", "threads": 2},
     ],
     ids=str,
 )
 def test_lanes_of_spoofers_equal_single_environments(arguments: dict[str, Any]) -> None:
     given: dict[str, Any] = {"scenario": SHORT} | arguments
-    steps, limit = given.pop("num_steps", 24), given.pop("max_episode_steps", None)
+    limit = given.pop("max_episode_steps", None)
     check_vector_env(
         lambda num_envs, mode: SpooferVectorEnv(num_envs, autoreset_mode=mode, max_episode_steps=limit, **given),
         lambda: gym.make(SPOOFER, max_episode_steps=limit, **given),
-        num_steps=steps,
+        num_steps=STEPS,
         sample_actions=slow_or_fast,
     )
 
@@ -69,17 +71,16 @@ def test_lanes_of_spoofers_equal_single_environments(arguments: dict[str, Any]) 
     [
         {"detectors": ("snapshot", "separation-bank:n=10"), "outage": 1.0, "multipath": 1.0},
         {"detectors": "kujur-monitor:n=10", "attacks": "partial:jump", "clean": 0.2, "threads": 2},
-        {"fidelity": "strapdown", "num_steps": 14},
+        {"fidelity": "strapdown"},
     ],
     ids=str,
 )
 def test_lanes_of_defenders_equal_single_environments(arguments: dict[str, Any]) -> None:
     given: dict[str, Any] = {"scenario": SHORT, "detectors": "snapshot", "attacks": "ramp:1"} | arguments
-    steps = given.pop("num_steps", 24)
     check_vector_env(
         lambda num_envs, mode: DefenderVectorEnv(num_envs, autoreset_mode=mode, **given),
         lambda: gym.make(DEFENDER, **given),
-        num_steps=steps,
+        num_steps=STEPS,
         sample_actions=mostly_use,
     )
 
