@@ -1,15 +1,14 @@
-"""Runs that are killed, resumed, contradicted and damaged: they end as if nothing had happened, or say why not.
+"""Runs that are killed, resumed and contradicted: they end as if nothing had happened, or say why not.
 
-A kill is an exception that nothing catches, raised at a write: the files are then what a killed process leaves.
+A kill is an exception that nothing catches, raised at a write, or a copy of the folder made there: the files are then
+what a killed process leaves.
 """
 
 import json
 import shutil
 import signal
-import subprocess
 import sys
 import time
-import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -18,96 +17,39 @@ import torch
 from rich.console import Console
 
 from spoofgym import files
-from spoofgym.envs.config import DefenderConfig, SpooferConfig
-from spoofgym.learning import defender, defender_ppo, ppo, spoofer, watch
-from spoofgym.learning.run_folder import CHECKPOINT_FILE, Run, RunFolder
+from spoofgym.learning import defender, spoofer, watch
+from spoofgym.learning.run_folder import CHECKPOINT_FILE, RunFolder
 from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
+from tests.learning.runs import PROGRAMS, TYPES, begun, result, resume
 
 pytestmark = pytest.mark.xdist_group("run folders")  # one worker: the uninterrupted runs are made once
-
-SPOOFER = Run(
-    SpooferConfig(scenario="liu-flight:horizon=12", detector="windowed:n=5,threshold=45"),
-    ppo.Settings(lanes=4, trials=2, epochs=2, hidden=8),
-    3,
-    240,
-)
-"""Games that an alarm ends, so that lanes are in mid-game where a rollout ends."""
-EXPECTED = replace(SPOOFER, environment=SpooferConfig(scenario="liu-flight:horizon=12"))
-DEFENDER = Run(
-    DefenderConfig(scenario="foi-drive:horizon=40", detectors=("snapshot",)),
-    defender_ppo.Settings(lanes=3, epochs=2, hidden=8, imitate=False, validation_episodes=6),
-    4,
-    360,
-)
-PROGRAMS = {"spoofer": (spoofer, SPOOFER), "expected": (spoofer, EXPECTED), "defender": (defender, DEFENDER)}
-TYPES = {spoofer: (SpooferConfig, ppo.Settings), defender: (DefenderConfig, defender_ppo.Settings)}
 
 
 class Killed(BaseException):
     """The process ends here."""
 
 
-def begun(path, name):
-    """A run folder just after its start."""
-    program, run = PROGRAMS[name]
-    RunFolder(path, "train.x", *TYPES[program]).begin(run)
-    return program
-
-
-def resume(program, path, *options):
-    return program.main(["--resume", "--out", str(path), *options])
-
-
-def result(path):
-    """All that a run leaves, but for logs: by name."""
-    found = {file.name: file.read_bytes() for file in path.iterdir() if file.is_file()}
-    found[CHECKPOINT_FILE] = repr(torch.load(path / CHECKPOINT_FILE, weights_only=True))
-    return found
-
-
-@pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory):
-    """The results of runs that nothing stopped, and the number of files that each wrote."""
-    made = {}
-
-    def make(name):
-        if name not in made:
-            path = tmp_path_factory.mktemp("runs") / "run"
-            program, writes, real = begun(path, name), [], files.write_bytes
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(files, "write_bytes", lambda *given: (writes.append(given[0]), real(*given)))
-                assert resume(program, path) == 0
-            made[name] = path, result(path), len(writes)
-        return made[name]
-
-    return make
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["spoofer", "defender"])
 def test_a_run_killed_at_any_write_ends_as_if_it_had_not_been(name, uninterrupted, tmp_path, monkeypatch):
-    """Before the file has its name: half of it lies there as a draft."""
+    """One run leaves a copy of its folder before each write, where half of the new file lies there as a draft."""
     _, expected, writes = uninterrupted(name)
-    real = files.write_bytes
-    for write in range(1, writes + 1):
-        path, count = tmp_path / str(write) / "run", 0
-        path.parent.mkdir()
+    path, real, copies = tmp_path / "run", files.write_bytes, []
 
-        def dying(target, content, path=path, write=write):
-            nonlocal count
-            count += 1
-            if count == write:
-                (path / f".kill{files.DRAFT}").write_bytes(content[: len(content) // 2])
-                raise Killed
-            real(target, content)
+    def copying(target, content):
+        copies.append(tmp_path / str(len(copies)) / "run")
+        shutil.copytree(path, copies[-1])
+        (copies[-1] / f".kill{files.DRAFT}").write_bytes(content[: len(content) // 2])
+        real(target, content)
 
-        program = begun(path, name)
-        with monkeypatch.context() as patch:
-            patch.setattr(files, "write_bytes", dying)
-            with pytest.raises(Killed):
-                resume(program, path)
+    program = begun(path, name)
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "write_bytes", copying)
         assert resume(program, path) == 0
-        assert result(path) == expected, f"killed at write {write} of {writes}"
+    assert len(copies) == writes
+    for write, left in enumerate(copies, start=1):
+        assert resume(program, left) == 0
+        assert result(left) == expected, f"killed at write {write} of {writes}"
 
 
 @pytest.mark.parametrize("name", ["spoofer", "defender"])
@@ -126,7 +68,7 @@ def test_a_run_killed_many_times_ends_all_the_same(name, uninterrupted, tmp_path
     program, kills = begun(path, name), 0
     monkeypatch.setattr(files, "write_bytes", dying)
     while True:
-        left = 4 + kills
+        left = 3 + kills
         try:
             assert resume(program, path) == 0
             break
@@ -187,7 +129,7 @@ def test_a_resumed_run_does_not_depend_on_what_came_before_its_checkpoint(uninte
         ("spoofer", ["--knowledge", "full"], "--knowledge full was given, the run has shadow"),
         ("spoofer", ["--action", "innovation"], "--action innovation was given, the run has rate"),
         ("spoofer", ["--fidelity", "strapdown"], "--fidelity strapdown was given, the run has linear"),
-        ("defender", ["--steps", "900"], "--steps 900 was given, the run has 360"),
+        ("defender", ["--steps", "900"], "--steps 900 was given, the run has 240"),
         ("defender", ["--scenario", "foi-drive"], "--scenario foi-drive was given, the run has foi-drive:horizon=40"),
         ("defender", ["--detector", "windowed"], "--detector windowed was given, the run has snapshot"),
         ("defender", ["--lanes", "256"], "--lanes 256 was given, the run has 3"),
@@ -265,248 +207,23 @@ def test_the_run_of_the_other_player_is_not_resumed(tmp_path, capsys):
     assert capsys.readouterr().err == f"error: {tmp_path / 'run'} is the run folder of a spoofer, not of a defender\n"
 
 
-# --- damage -----------------------------------------------------------------------------------------------------------
-
-
-def truncated(content):
-    return content[: len(content) // 2]
-
-
-def flipped(content):
-    middle = len(content) // 2
-    return content[:middle] + bytes(byte ^ 0xFF for byte in content[middle : middle + 40]) + content[middle + 40 :]
-
-
-BYTES = {
-    "truncated": truncated,
-    "flipped": flipped,
-    "empty": lambda content: b"",
-    "text": lambda content: b"this is no run\n",
-    "zeros": lambda content: bytes(len(content)),
-    "other": lambda content: b"\x80\x04\x95",
-    "null": lambda content: b"null",
-}
-
-
-@pytest.mark.parametrize("name", ["spoofer", "defender"])
-@pytest.mark.parametrize("file", [CONFIG_FILE, CHECKPOINT_FILE])
-@pytest.mark.parametrize("damage", BYTES)
-def test_a_damaged_file_is_named_in_one_line(name, file, damage, uninterrupted, tmp_path, capsys):
-    made, _, _ = uninterrupted(name)
-    path = tmp_path / "run"
-    shutil.copytree(made, path)
-    (path / file).write_bytes(BYTES[damage]((path / file).read_bytes()))
-    capsys.readouterr()
-    assert resume(PROGRAMS[name][0], path, "--steps", "5000") == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"error: {path / file} is damaged: ")
-
-
-def changed_config(*keys, value):
-    def change(content):
-        inner = content
-        for key in keys[:-1]:
-            inner = inner[key]
-        inner[keys[-1]] = value
-
-    return change
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        changed_config("learner", "lanes", value=10**12),
-        changed_config("learner", "lanes", value="many"),
-        changed_config("learner", "lanes", value=2.5),
-        changed_config("learner", "hidden", value=10**9),
-        changed_config("learner", "minibatches", value=0),
-        changed_config("learner", "learning_rate", value=float("nan")),
-        changed_config("learner", value=[]),
-        changed_config("learner", "colour", value=1),
-        changed_config("environment", "scenario", value=5),
-        changed_config("environment", "scenario", value=["foi-drive"]),
-        changed_config("environment", "threads", value=10**9),
-        changed_config("environment", "threads", value="x"),
-        changed_config("environment", value=None),
-        changed_config("seed", value=-1),
-        changed_config("seed", value=True),
-        changed_config("seed", value=2**32),
-        changed_config("steps", value=0),
-        changed_config("steps", value=1e99),
-        changed_config("steps", value=10**13),
-        lambda content: content.pop("steps"),
-        lambda content: content["learner"].pop("epochs"),
-    ],
-)
-@pytest.mark.parametrize("name", ["spoofer", "defender"])
-def test_a_config_that_says_nonsense_is_named_in_one_line(name, change, tmp_path, capsys):
-    path = tmp_path / "run"
-    program = begun(path, name)
-    content = json.loads((path / CONFIG_FILE).read_text())
-    change(content)
-    (path / CONFIG_FILE).write_text(json.dumps(content))
-    assert resume(program, path) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"error: {path / CONFIG_FILE} is damaged: ")
-
-
-@pytest.mark.parametrize(
-    ("name", "key", "value", "reason"),
-    [
-        ("spoofer", "scenario", "foo", "unknown scenario 'foo'"),
-        ("spoofer", "scenario", "recorded:/nowhere", "/nowhere"),
-        ("spoofer", "detector", "foo", "unknown detector 'foo'"),
-        ("spoofer", "shadow", "foo", "unknown scenario 'foo'"),
-        ("defender", "scenario", "foi-drive:colour=red", "colour"),
-        ("defender", "detectors", ["snapshot", "foo"], "unknown detector 'foo'"),
-        ("defender", "attacks", "foo", "unknown attack"),
-    ],
-)
-def test_a_part_of_a_run_that_cannot_be_built_is_told_with_its_file(name, key, value, reason, tmp_path, capsys):
-    path = tmp_path / "run"
-    program = begun(path, name)
-    content = json.loads((path / CONFIG_FILE).read_text())
-    content["environment"][key] = value
-    (path / CONFIG_FILE).write_text(json.dumps(content))
-    assert resume(program, path) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"error: {path / CONFIG_FILE}: ")
-    assert reason in line
-
-
-@pytest.mark.parametrize("program", [spoofer, defender])
-def test_a_part_of_a_new_run_that_cannot_be_built_has_no_file(program, tmp_path, capsys):
-    assert program.main(["--scenario", "foo", "--out", str(tmp_path / "run")]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "unknown scenario 'foo'" in line
-    assert CONFIG_FILE not in line
-
-
-def of_learner(key, change):
-    def act(state):
-        state["learner"][key] = change(state["learner"][key])
-
-    return act
-
-
-def nan_in(tensors):
-    first = next(iter(tensors))
-    return {**tensors, first: torch.full_like(tensors[first], float("nan"))}
-
-
-def wider(tensors):
-    return {name: torch.cat([tensor, tensor]) for name, tensor in tensors.items()}
-
-
-STATES = {
-    "no learner": lambda state: state.pop("learner"),
-    "learner none": lambda state: state.update(learner=None),
-    "learner text": lambda state: state.update(learner="x"),
-    "NaN weights": of_learner("weights", nan_in),
-    "other shapes": of_learner("weights", wider),
-    "other names": of_learner("weights", lambda tensors: {f"x{name}": value for name, value in tensors.items()}),
-    "other types": of_learner("weights", lambda tensors: {name: value.double() for name, value in tensors.items()}),
-    "numbers": of_learner("weights", lambda tensors: {name: 1.0 for name in tensors}),
-    "steps": of_learner("steps", lambda steps: "many"),
-    "negative": of_learner("steps", lambda steps: -1),
-    "games": of_learner("games", lambda games: games[:, :1]),
-    "games NaN": of_learner("games", lambda games: games * float("nan")),
-    "moments": of_learner("moments", lambda moments: {name: {} for name in moments}),
-    "moments of none": of_learner("moments", lambda moments: {"nobody": {}}),
-    "moments list": of_learner("moments", lambda moments: []),
-    "played": lambda state: state.update(played="x"),
-    "finished": lambda state: state.pop("finished"),
-}
-
-
-@pytest.mark.parametrize("damage", STATES)
-@pytest.mark.parametrize("name", ["spoofer", "defender"])
-def test_a_checkpoint_of_another_form_is_named_in_one_line(name, damage, uninterrupted, tmp_path, capsys):
-    made, _, _ = uninterrupted(name)
-    path = tmp_path / "run"
-    shutil.copytree(made, path)
-    state = torch.load(path / CHECKPOINT_FILE, weights_only=True)
-    STATES[damage](state)
-    torch.save(state, path / CHECKPOINT_FILE)
-    capsys.readouterr()
-    assert resume(PROGRAMS[name][0], path, "--steps", "5000") == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"error: {path / CHECKPOINT_FILE} is damaged: ")
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("spoofer", {"trial": 9}),
-        ("spoofer", {"best_trial": 2}),
-        ("spoofer", {"before": -3}),
-        ("spoofer", {"best": {}}),
-        ("defender", {"validation": []}),
-        ("defender", {"validation": [{"steps": 0, "mean_error_m": float("nan")}]}),
-        ("defender", {"validation": 3}),
-        ("defender", {"best": []}),
-        ("defender", {"best": [[torch.zeros(2, 2), torch.zeros(2)]]}),
-    ],
-)
-def test_a_checkpoint_of_another_place_is_named_in_one_line(name, change, uninterrupted, tmp_path, capsys):
-    made, _, _ = uninterrupted(name)
-    path = tmp_path / "run"
-    shutil.copytree(made, path)
-    state = torch.load(path / CHECKPOINT_FILE, weights_only=True)
-    torch.save({**state, **change}, path / CHECKPOINT_FILE)
-    capsys.readouterr()
-    assert resume(PROGRAMS[name][0], path, "--steps", "5000") == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"error: {path / CHECKPOINT_FILE} is damaged: ")
-
-
-class Stranger:
-    """What a pickle can do where it is loaded."""
-
-    def __reduce__(self):
-        return (open, ("opened-by-a-stranger", "w"))
-
-
-def test_nothing_of_a_stranger_is_unpickled(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "run"
-    program = begun(path, "spoofer")
-    torch.save({"learner": Stranger(), "played": 0, "finished": 0}, path / CHECKPOINT_FILE)
-    assert resume(program, path) == 2
-    assert f"{path / CHECKPOINT_FILE} is damaged" in capsys.readouterr().err
-    assert not (tmp_path / "opened-by-a-stranger").exists()
-
-
-def test_a_checkpoint_that_unpacks_to_any_size_is_refused(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("spoofgym.learning.checkpoint.LARGEST", 10**6)
-    path = tmp_path / "run"
-    program = begun(path, "spoofer")
-    with zipfile.ZipFile(path / CHECKPOINT_FILE, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("checkpoint/data.pkl", bytes(10**7))
-    assert (path / CHECKPOINT_FILE).stat().st_size < 10**5
-    assert resume(program, path) == 2
-    assert "it unpacks to 10000000 bytes" in capsys.readouterr().err
-
-
 # --- as a process -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
-def test_a_process_that_is_killed_goes_on(uninterrupted, tmp_path):
-    """SIGKILL before the first checkpoint, and as soon as there is one."""
+def test_a_process_that_is_killed_goes_on(uninterrupted, tmp_path, child):
+    """SIGKILL as soon as there is a checkpoint."""
     _, expected, _ = uninterrupted("spoofer")
     path = tmp_path / "run"
-    begun(path, "spoofer")
-    command = [sys.executable, "-m", "spoofgym.learning.spoofer", "--resume", "--out", str(path)]
-    for awaited in (CONFIG_FILE, CHECKPOINT_FILE):
-        process = subprocess.Popen(command, stderr=subprocess.PIPE)
-        deadline = time.monotonic() + 300
-        while not (path / awaited).exists() and process.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.005)
-        process.send_signal(signal.SIGKILL)
-        process.communicate(timeout=60)
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0 or "steps already" in done.stderr
+    program = begun(path, "spoofer")
+    process = child([sys.executable, "-m", "spoofgym.learning.spoofer", "--resume", "--out", str(path)])
+    deadline = time.monotonic() + 300
+    while not (path / CHECKPOINT_FILE).exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.communicate(timeout=60)
+    if result(path) != expected:
+        assert resume(program, path) == 0
     assert result(path) == expected
 
 
