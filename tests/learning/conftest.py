@@ -1,9 +1,19 @@
-"""Runs that nothing stopped, made once for all tests of run folders, which one worker runs."""
+"""Runs that nothing stopped, each made once for several files of tests, which one worker runs."""
 
 import pytest
 
 from spoofgym import files
-from tests.learning.runs import begun, result, resume
+from spoofgym.learning import defender
+from tests.learning.runs import SHORT, STEPS, begun, few_lessons, result, resume
+
+
+@pytest.fixture(scope="session")
+def taught(tmp_path_factory):
+    """The folder of a short run of the defender's training."""
+    folder = tmp_path_factory.mktemp("runs") / "short"
+    with few_lessons():
+        assert defender.main([*SHORT, "--steps", str(STEPS), "--out", str(folder)]) == 0
+    return folder
 
 
 @pytest.fixture(scope="session")

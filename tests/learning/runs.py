@@ -1,11 +1,13 @@
-"""Short runs of both training programs, for what may happen to a run folder."""
+"""Short runs of both training programs, for what may happen to a run folder, and of a defender that imitates first."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 
+import pytest
 import torch
 
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
-from spoofgym.learning import defender, defender_ppo, ppo, spoofer
+from spoofgym.learning import defender, defender_ppo, imitation, ppo, spoofer
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, Run, RunFolder
 
 SPOOFER = Run(
@@ -24,6 +26,21 @@ DEFENDER = Run(
 )
 PROGRAMS = {"spoofer": (spoofer, SPOOFER), "expected": (spoofer, EXPECTED), "defender": (defender, DEFENDER)}
 TYPES = {spoofer: (SpooferConfig, ppo.Settings), defender: (DefenderConfig, defender_ppo.Settings)}
+
+DRIVE, STEPS = "foi-drive:horizon=60", 480
+SHORT = ["--scenario", DRIVE, "--detector", "snapshot", "--lanes", "4", "--validation-episodes", "20"]
+SHORT += ["--critic-games", "1"]
+"""Options of the defender's training that imitates first."""
+
+
+@contextmanager
+def few_lessons():
+    """Imitation goes through all of its steps, in few games: no test here asks what is learned in it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(defender_ppo, "TEACHING_LANES", 8)
+        for name, value in (("FEW", 1), ("MANY", 2), ("PASSES", 5)):
+            patch.setattr(imitation, name, value)
+        yield
 
 
 def begun(path, name):

@@ -1,10 +1,13 @@
 """The programs as a user runs them: a short training, its evaluation, interruption and resumption, bad input."""
 
+import contextlib
+import io
 import json
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +30,7 @@ ROW_KEYS = {
     "fraction_of_optimum",
 }
 BASELINES = ["none", "random", "best-ramp", "closed-form", "optimum", "upper-bound"]
+ROOT = Path(__file__).parents[2]
 SHORT = ["--scenario", "liu-flight:horizon=20", "--threads", "1"]
 
 
@@ -53,10 +57,16 @@ def test_a_run_folder_is_not_overwritten(run, capsys):
     assert (run / POLICY_FILE).read_bytes() == before
 
 
-def test_json_alone_on_stdout(run, capsys):
-    arguments = ["--attacker", str(run), "--episodes", "300", "--json", "-", "--attack", "ramp:0.2"]
-    assert evaluate.main([*SHORT, *arguments]) == 0
-    report = json.loads(capsys.readouterr().out)
+@pytest.fixture(scope="module")
+def report(run):
+    """What an evaluation writes to standard output, where nothing else may stand."""
+    arguments = ["--attacker", str(run), "--episodes", "2000", "--json", "-", "--attack", "ramp:0.2"]
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert evaluate.main([*SHORT, *arguments]) == 0
+    return json.loads(out.getvalue())
+
+
+def test_json_alone_on_stdout(report):
     assert (report["schema_version"], report["kind"]) == (1, "attackers")
     assert report["detector"]["name"] == "snapshot"
     assert report["detector"]["threshold"] == 25.9
@@ -72,11 +82,9 @@ def test_json_alone_on_stdout(run, capsys):
     assert 0 <= rows["short"]["fraction_of_optimum"] <= 1
 
 
-def test_exact_score_of_a_policy_agrees_with_simulation(run, tmp_path):
-    """6 sigma of 4000 games: false failure below 1e-8; the filter's noise in the norm adds up to its own size."""
-    out = tmp_path / "out.json"
-    assert evaluate.main([*SHORT, "--attacker", str(run), "--episodes", "4000", "--json", str(out)]) == 0
-    row = json.loads(out.read_text())["rows"][-1]
+def test_exact_score_of_a_policy_agrees_with_simulation(report):
+    """6 sigma of 2000 games: false failure below 1e-8; the filter's noise in the norm adds up to its own size."""
+    row = report["rows"][-1]
     standard_error = (row["ci95_m"][1] - row["ci95_m"][0]) / (2 * 1.96)
     assert abs(row["mean_undetected_error_m"] - row["exact_undetected_error_m"]) < 6 * standard_error + 1.0
 
@@ -110,13 +118,14 @@ def test_a_run_can_be_resumed(run, tmp_path):
 
 @pytest.mark.slow
 def test_interruption_leaves_a_usable_policy(tmp_path, child):
+    """Of the program as a checkout starts it."""
     folder = tmp_path / "interrupted"
-    command = [sys.executable, "-m", "spoofgym.learning.spoofer", *SHORT, "--steps", "100000000", "--out", str(folder)]
-    process = child(command, stderr=subprocess.PIPE)
+    command = [sys.executable, "-m", "train.spoofer", *SHORT, "--steps", "100000000", "--out", str(folder)]
+    process = child(command, stderr=subprocess.PIPE, cwd=ROOT)
     deadline = time.monotonic() + 600
-    while not list(folder.rglob("events.*")) and time.monotonic() < deadline:
-        time.sleep(0.2)
-    time.sleep(2.0)
+    while not list(folder.rglob("events.*")) and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130, errors

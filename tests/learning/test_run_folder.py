@@ -213,10 +213,10 @@ def test_the_run_of_the_other_player_is_not_resumed(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_process_that_is_killed_goes_on(uninterrupted, tmp_path, child):
     """SIGKILL as soon as there is a checkpoint."""
-    _, expected, _ = uninterrupted("spoofer")
+    _, expected, _ = uninterrupted("defender")
     path = tmp_path / "run"
-    program = begun(path, "spoofer")
-    process = child([sys.executable, "-m", "spoofgym.learning.spoofer", "--resume", "--out", str(path)])
+    program = begun(path, "defender")
+    process = child([sys.executable, "-m", "spoofgym.learning.defender", "--resume", "--out", str(path)])
     deadline = time.monotonic() + 300
     while not (path / CHECKPOINT_FILE).exists() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.005)
