@@ -16,7 +16,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.defender_seat import DefenderSeat, demands_on
 from spoofgym.envs.spoofer_seat import SpooferSeat
-from spoofgym.envs.trained import defender_config, spoofer_config
+from spoofgym.envs.trained import defender_config, sees_decisions, spoofer_config
 from spoofgym.navigation.interface import Clock, Decision, Epoch
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.responses.base import Response
@@ -38,7 +38,7 @@ class PolicySpoofer(Attack):
             name: the specification that builds this attack; None = the name of the policy, which builds none.
         """
         self._policy, self._name = policy, policy.name if name is None else name
-        self._config = spoofer_config(policy)
+        self._config, self._sees_decisions = spoofer_config(policy), sees_decisions(policy)
         self.knowledge = self._config.knowledge
         self.has_tracking_error = self._config.tracking_sigma > 0.0
 
@@ -57,7 +57,7 @@ class PolicySpoofer(Attack):
         names = _names(config.detector) if config.knowledge == "full" else ()
         _require_detectors(self.name, names, simulation)
         try:
-            self._seat = SpooferSeat(simulation, config, names)
+            self._seat = SpooferSeat(simulation, config, names, self._sees_decisions)
         except ValueError as error:
             raise ValueError(f"{self.name!r} cannot play on scenario {simulation.scenario.name!r}: {error}") from error
         self._policy.check_layout([field.name for field in self._seat.fields])

@@ -20,6 +20,7 @@ from typing_extensions import Self
 
 from spoofgym import files
 from spoofgym.archive import read_arrays
+from spoofgym.policies.card import CARD_FILE, Card, layout_digest, read_card, weights_digest
 from spoofgym.policies.network import affine
 
 POLICY_FILE = "policy.npz"
@@ -27,8 +28,13 @@ CONFIG_FILE = "config.json"
 LARGEST_CONFIG = 2**20
 """Largest ``config.json`` that is read, bytes; a real one has about a thousand."""
 SPOOFER, DEFENDER = "spoofer", "defender"
-TOLD_BY = {SPOOFER: "knowledge", DEFENDER: "attacks"}
-"""The argument of an environment that tells whose it is: no other environment has it."""
+TOLD_BY = (
+    ("defender", SPOOFER, "spoofgym/DuelSpoofer-v0"),
+    ("spoofer", DEFENDER, "spoofgym/DuelDefender-v0"),
+    ("knowledge", SPOOFER, "spoofgym/Spoofer-v0"),
+    ("attacks", DEFENDER, "spoofgym/Defender-v0"),
+)
+"""The first argument found among those of an environment tells who plays there, and its id."""
 SLOT_FIELD = "satellite in slot"
 """How the names of the entries begin that tell which slots hold a satellite."""
 
@@ -55,10 +61,24 @@ def kind_of(configuration: Mapping[str, Any]) -> str:
     Raises:
         ValueError: the configuration does not tell.
     """
-    for kind, argument in TOLD_BY.items():
+    return _told(configuration)[0]
+
+
+def environment_of(configuration: Mapping[str, Any]) -> str:
+    """The id of the environment whose configuration this is.
+
+    Raises:
+        ValueError: the configuration does not tell.
+    """
+    return _told(configuration)[1]
+
+
+def _told(configuration: Mapping[str, Any]) -> tuple[str, str]:
+    for argument, kind, environment in TOLD_BY:
         if argument in configuration:
-            return kind
-    raise ValueError(f"its environment has none of the arguments {', '.join(TOLD_BY.values())}: who plays is unknown")
+            return kind, environment
+    names = ", ".join(argument for argument, *_ in TOLD_BY)
+    raise ValueError(f"its environment has none of the arguments {names}: who plays is unknown")
 
 
 @dataclass(frozen=True)
@@ -143,7 +163,7 @@ class LearnedPolicy:
             ValueError: a file is damaged, or the policy plays the other side.
         """
         configuration = _configuration(folder)
-        with files.reading(folder / CONFIG_FILE):
+        with files.reading(described_by(folder)):
             kind = kind_of(configuration)
         if kind != cls.kind:
             raise ValueError(f"{folder} is the run folder of a {kind}, not of a {cls.kind}")
@@ -152,7 +172,31 @@ class LearnedPolicy:
         with files.reading(path):
             policy = cls(folder, configuration, *_network(arrays))
             policy.check_outputs()
+        if (folder / CARD_FILE).is_file():
+            policy.check_card(read_card(folder))
         return policy
+
+    @property
+    def weights_digest(self) -> str:
+        """Digest of the weights and biases: equal for equal policies."""
+        return weights_digest((*self.weights, *self.biases))
+
+    def check_card(self, card: Card) -> None:
+        """Refuse the card of another policy.
+
+        Raises:
+            ValueError: its layout or its weights are not those of this policy.
+        """
+        pairs = {
+            "layout": (card.layout_digest, layout_digest(self.layout)),
+            "weights": (card.weights_digest, self.weights_digest),
+        }
+        for what, (told, found) in pairs.items():
+            if told != found:
+                raise ValueError(
+                    f"{self.folder / CARD_FILE} is the card of another policy: its {what} have the digest "
+                    f"{told[:12]}, those of {POLICY_FILE} have {found[:12]}"
+                )
 
     def check_outputs(self) -> None:
         """Refuse a network whose last layer is not that of the player.
@@ -163,13 +207,21 @@ class LearnedPolicy:
         raise NotImplementedError
 
 
+def described_by(folder: Path) -> Path:
+    """The file that tells what a policy was trained on: the card, where there is one, else that of the run."""
+    card = folder / CARD_FILE
+    return card if card.is_file() else folder / CONFIG_FILE
+
+
 def _configuration(folder: Path) -> dict[str, Any]:
-    """The arguments of the environment of a run folder that holds a policy.
+    """The arguments of the environment of a folder that holds a policy: a run, or a published agent with its card.
 
     Raises:
         FileNotFoundError: it holds no policy.
-        ValueError: ``config.json`` is damaged.
+        ValueError: ``config.json`` or ``card.json`` is damaged.
     """
+    if (folder / POLICY_FILE).is_file() and (folder / CARD_FILE).is_file():
+        return dict(read_card(folder).arguments)
     for name in (POLICY_FILE, CONFIG_FILE):
         if not (folder / name).is_file():
             raise FileNotFoundError(f"{folder} is no run folder: it has no {name}")
@@ -218,7 +270,7 @@ class LearnedSpoofer(LearnedPolicy):
 
     def with_shadow(self, shadow: str | None) -> Self:
         """This policy with a shadow filter of another scenario (None: the victim's own); a blind one has none."""
-        if self.configuration.get(TOLD_BY[SPOOFER]) == "blind":
+        if self.configuration.get("knowledge") == "blind":
             return self
         return replace(self, configuration={**self.configuration, "shadow": shadow})
 
@@ -270,6 +322,6 @@ def load_policy(folder: Path) -> LearnedSpoofer | LearnedDefender:
         ValueError: a file is damaged, or does not tell who plays.
     """
     configuration = _configuration(folder)
-    with files.reading(folder / CONFIG_FILE):
+    with files.reading(described_by(folder)):
         kind = kind_of(configuration)
     return LearnedSpoofer.load(folder) if kind == SPOOFER else LearnedDefender.load(folder)
