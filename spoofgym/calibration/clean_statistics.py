@@ -21,7 +21,7 @@ CleanStatistics = Callable[[Detector, int, np.random.Generator], tuple[Floats, F
 """(detector, runs, randomness) -> its statistic in the burn-in (n, B) and in the clean epochs after it (n, K)."""
 
 JointStatistics = Callable[[Sequence[Detector], int, np.random.Generator], list[tuple[Floats, Floats]]]
-"""The same of several detectors on the same clean runs."""
+"""(detectors, runs, randomness) -> of each detector what `CleanStatistics` gives, all on the same clean runs."""
 
 
 def white_statistics(

@@ -108,7 +108,7 @@ def play_response(world: World, detector: str, response: Response, episodes: int
         world: what is played in.
         detector: name of the one whose alarm the response follows.
         response: what follows an alarm.
-        episodes: how many games; game i is seeded ``seed + i``, whoever defends.
+        episodes: how many games; game i is seeded ``seed + i`` for every defender.
         seed: of game 0.
 
     Raises:

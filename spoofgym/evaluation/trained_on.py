@@ -1,4 +1,4 @@
-"""What a policy was trained on, where it plays something else: it may play, and whoever reads its score should know."""
+"""What a policy was trained on, where it plays something else: it may play, and a reader of its score should know."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Log:
         start: first moment fit for alignment, s.
         imu_time: of the inertial samples, (n,), s, increasing, the IMU's delay subtracted.
         angular_rate: body R, F, U, (n, 3), rad/s.
-        specific_force: the same, m/s².
+        specific_force: body R, F, U, (n, 3), m/s².
         lever_arm: from the IMU to the antenna, body R, F, U, (3,), m.
         fixes: of the receiver, their delay, stated or found, subtracted.
         reference: solution to compare with; None = the log has none.

@@ -32,10 +32,10 @@ NOTES = "notes"
 CLOSE = 0.5
 """Similarity from which a key is taken for a mistyped one (`difflib.get_close_matches`)."""
 SURE = 0.8
-"""The same where other keys are welcome."""
+"""Similarity from which a key is taken for a mistyped one where other keys are welcome."""
 VALID = f"{', '.join(SETTINGS)}; remarks belong in a table [{NOTES}]"
 LONGEST = 1_000_000
-"""Bytes of a ``log.toml`` at most."""
+"""Most bytes of a ``log.toml``."""
 ROTATION_TOLERANCE = 1e-3
 FARTHEST_ANTENNA = 100.0
 """Longest lever arm per axis, m."""

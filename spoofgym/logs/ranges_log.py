@@ -38,11 +38,11 @@ CODE_SIGMA = 4.0
 with falling C/N0 in this way and are half as large, but multipath is slow, and only with twice that are the innovations
 of a filter near its own sigmas. A figure chosen on one log."""
 RATE_SIGMA = 0.2
-"""The same of a range rate, m/s."""
+"""1 sigma of a range rate at `REFERENCE_CN0`, m/s."""
 REFERENCE_CN0 = 45.0
-"""dB-Hz."""
+"""Carrier-to-noise ratio at which the sigmas above hold, dB-Hz."""
 STRONGEST_CN0 = 50.0
-"""Above it ranges become no better, dB-Hz."""
+"""Carrier-to-noise ratio above which ranges become no better, dB-Hz."""
 MAX_RATE_SIGMA = 10.0
 """A range rate that its receiver trusts less is none, m/s."""
 MAX_AGE = 4.0 * 3600.0

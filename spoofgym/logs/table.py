@@ -15,14 +15,14 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.validation import LATEST
 
 LARGEST = 2**28
-"""Bytes of text in a table at most, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that
+"""Most bytes of text in a table, unpacked: 6 hours of an IMU at 100 Hz with 120 bytes a line. An archive that
 unpacks to more is not read on."""
 MOST_LINES = 10_000_000
-"""In a table: 7 hours of an IMU at 400 Hz."""
+"""Most lines of a table: 7 hours of an IMU at 400 Hz."""
 LONGEST_LINE = 100_000
-"""Characters of a line at most: some thousand columns."""
+"""Most characters of a line: some thousand columns."""
 SHOWN = 200
-"""Characters of a file that a message quotes at most."""
+"""Most characters of a file that a message quotes."""
 
 TIMES = (-LATEST, LATEST)
 """Valid values of a time, s."""

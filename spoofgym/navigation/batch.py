@@ -69,7 +69,7 @@ class FilterBatch(ABC):
     grain: int
     """Runs below which a slice is not worth a thread."""
     carry_grain: int
-    """The same, where runs are carried to their next epoch."""
+    """Runs below which a slice is not worth a thread when runs are carried to their next epoch."""
     past: History
 
     def __init__(self, num_runs: int, dimension: int, slices: RunSlices, demands: Demands, num_slots: int = 0) -> None:

@@ -106,7 +106,7 @@ def _best_rates(
 
     Args:
         response: whitened innovations of ramps of 1 m/s east and north, (2, K, m).
-        error: final horizontal errors of the same, (2, 2), m.
+        error: final horizontal errors of these ramps, (2, 2), m.
         azimuth: (A,), degrees.
         threshold: of the snapshot test.
         limit: largest rate east and north, (2,), m/s.

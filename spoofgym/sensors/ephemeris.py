@@ -15,7 +15,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.sensors.constellation import EARTH_RATE, GRAVITATIONAL_PARAMETER, per_satellite, plane_to_earth
 
 WEEK = 604_800.0
-"""s."""
+"""Length of a week of GPS time, s."""
 RELATIVITY = -2.0 * np.sqrt(GRAVITATIONAL_PARAMETER) / speed_of_light**2
 """F of the relativistic correction of the satellite's clock, s/√m (IS-GPS-200, section 20.3.3.3.3.1)."""
 LARGEST_ECCENTRICITY = 0.5

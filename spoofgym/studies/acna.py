@@ -47,9 +47,9 @@ TESTS = ("jump", "slow")
 ATTACKS = {"jump": "jump:onset=150", "slow": "slow-change:onset=150"}
 """Data sets Ψ̃2 and Ψ̃3; both last to the end."""
 EPOCHS = np.arange(1, 21)
-"""n_j and n_s (section 4.3)."""
+"""Lengths of window that are studied, n_j and n_s (section 4.3)."""
 WINDOWS = (1, 2, 3, 5, 10, 20)
-"""Of the table."""
+"""Those that the table shows."""
 THRESHOLDS = {"jump": np.round(0.1 * np.arange(61), 10), "slow": np.round(0.1 * np.arange(101), 10)}
 """Th_j of eq 30 and Th_s of eq 33, m, the latter in steps of 0.1 m instead of 0.01 m."""
 PUBLISHED = {

@@ -1,4 +1,4 @@
-"""Notes on stderr: a policy may play what it was not trained on, and whoever reads its score should know."""
+"""Notes on stderr: a policy may play what it was not trained on, and a reader of its score should know."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class AuxiliaryRule:
 
     Attributes:
         anchoring: ``anchored``: it is set to the filter's position at every fix that is used. This is the reading that
-            gives the paper's accuracies: the auxiliary error stays that of a second. ``credited``: the same, but after
+            gives the paper's accuracies: the auxiliary error stays that of a second. ``credited``: so too, but once
             a fix has been left out or was missing, only from the ``credit``-th fix used in a row on, so that GNSS must
             earn its trust back. ``free``: never; the filter then follows it rather than GNSS.
         credit: fixes in a row, with ``credited``.

@@ -34,14 +34,14 @@ class StrapdownModel(Immutable):
     Attributes:
         time: of the epochs, (K+1,), s.
         angular_rate: inertial samples, body R, F, U, (n, 3), rad/s.
-        specific_force: the same, m/s².
+        specific_force: of these samples, body R, F, U, (n, 3), m/s².
         step: duration of each sample, (n,), s.
         boundaries: samples boundaries[k]..boundaries[k+1] lead to epoch k, (K+2,).
         fix_position: of the antenna when the fix was taken, without receiver noise, (K+1, 3), latitude rad, longitude
             rad, height m.
-        fix_velocity: the same, ENU, (K+1, 3), m/s.
+        fix_velocity: of the antenna at that moment, ENU, (K+1, 3), m/s.
         true_position: against which the error is formed, (K+1, 3).
-        true_velocity: the same, ENU, (K+1, 3), m/s.
+        true_velocity: against which its error is formed, ENU, (K+1, 3), m/s.
         lever_arm: of the antenna, body R, F, U, (3,), m.
         latency_samples: inertial samples between the fix and its epoch.
         measurement_covariance: the filter's R, (K+1, m, m).

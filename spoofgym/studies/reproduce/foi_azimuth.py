@@ -72,7 +72,7 @@ def largest_offset(attack: Attacked, units: float, turn: float) -> float:
 
 
 def largest_offset_in_game(number: int, scenario: Scenario) -> float:
-    """The same of the package's attack ``foi-NUMBER`` in a game of the drive, m."""
+    """Largest distance between spoofed and true position by the package's attack ``foi-NUMBER`` on the drive, m."""
     attack = make_attack(f"foi-{number}")
     attack.bind(scenario.timeline, 1)
     attack.follow(scenario.velocity())

@@ -46,7 +46,7 @@ class Game:
 
     Attributes:
         cpi: Σ s² / σ_s² over the epochs 1 to k, (N, K).
-        ci: Σ γ' S⁻¹ γ over the same, (N, K).
+        ci: Σ γ' S⁻¹ γ over these epochs, (N, K).
         carrier: innovations of the carriers, (N, K, S), m.
         separation: filter minus unaided inertial solution, up, after the last epoch, (N,), m.
     """

@@ -33,7 +33,7 @@ PAPER = "shadmehri-2025"
 TITLE = "Shadmehri and Mahboobi Esfanjani 2025, spoofing detection by a self-tuning Kalman filter"
 ONSET, END, WARM = 20.0, 25.0, 10.0
 WINDOW = 5.0
-"""s."""
+"""Length of the window of the self-tuning filter, s."""
 NOMINAL = 1e-5
 MATCHED = 0.01
 """Share of clean stretches as long as the attack in which there is an alarm."""
