@@ -10,6 +10,7 @@ from spoofgym.policies import published
 from spoofgym.policies.classical import ClassicalDefender
 from spoofgym.studies import evaluate
 from tests.run_folders import defender, spoofer
+from tests.scenarios.test_recorded import write_log
 
 FLIGHT = "liu-flight:horizon=40"
 
@@ -66,3 +67,17 @@ def test_what_is_no_defender_is_told(tmp_path: Path, capsys):
         assert evaluate.main(["--defender", given]) == 2
         error = capsys.readouterr().err
         assert f"--defender '{given}' is neither a run folder nor 'detector > response': 'nowhere' is no run f" in error
+
+
+def test_a_policy_attacks_a_recorded_log_that_shows_what_it_was_trained_to_see(tmp_path, capsys):
+    """A blind spoofer knows no filter; one with a shadow filter needs a linear model, which a log has not."""
+    log = f"recorded:{write_log(tmp_path / 'log', velocity=False)},horizon=30"
+    blind, seeing = (
+        spoofer({"scenario": FLIGHT, "knowledge": knowledge}, tmp_path / knowledge) for knowledge in ("blind", "shadow")
+    )
+    assert evaluate.main(["--scenario", log, "--attack", blind, "--attack", "none", "--json", "-"]) == 0
+    pulled, clean = json.loads(capsys.readouterr().out)["rows"]
+    assert pulled["attack"] == blind
+    assert pulled["max_error_m"] > clean["max_error_m"]
+    assert evaluate.main(["--scenario", log, "--attack", seeing]) == 2
+    assert "cannot play on scenario" in capsys.readouterr().err
