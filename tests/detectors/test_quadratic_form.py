@@ -43,7 +43,7 @@ def grid(weights, points=25):
     return np.concatenate([mean * np.geomspace(1e-4, 1.0, points), mean + deviation * np.geomspace(1e-3, 20.0, points)])
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 10, 100, 5000])
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 10, 100, 2000])
 def test_equal_weights_are_chi_square(n):
     exact = stats.chi2(n, scale=2.5)
     weights = np.full(n, 2.5)
@@ -74,14 +74,14 @@ def test_pairs_of_weights_are_a_sum_of_exponentials(rates):
 def test_the_original_integral(weights):
     weights = np.asarray(weights)
     compared = 0
-    for x in grid(weights, 15):
+    for x in grid(weights, 8):
         lower, upper = imhof(x, weights)
         if min(lower, upper) < 1e-10:
             continue
         compared += 1
         assert upper == pytest.approx(original_imhof(x, weights), abs=1e-11)
         assert lower + upper == pytest.approx(1.0, abs=1e-15)
-    assert compared > 15
+    assert compared > 8
 
 
 @pytest.mark.parametrize("weights", [*SPREADS, *COLOURED])

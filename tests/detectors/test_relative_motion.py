@@ -159,6 +159,7 @@ def test_a_published_threshold_takes_its_slope_from_clean_runs(monkeypatch, tmp_
 def test_a_game_shorter_than_the_window_is_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("SPOOFGYM_CACHE", str(tmp_path))
     monkeypatch.setattr(calibration, "_KNOWN", {})
+    monkeypatch.setattr(calibration, "RUNS", 500)
     scenario = make_scenario("liu-flight:horizon=8")
     with pytest.raises(ValueError, match="the game is too short for its window"):
         calibrated(make_detector("relative-motion:k=8"), scenario)

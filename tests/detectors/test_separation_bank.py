@@ -51,7 +51,7 @@ def test_shared_gains_and_own_covariances_say_the_same(direction):
 def test_the_separation_and_the_coasting_err_as_much_as_the_bank_believes():
     """900 games in which one filter uses every range and its twin none of the last 20; intervals of 1e-8 each."""
     runs, last, n = 900, 30, 20
-    (using, _), (coasting, _) = simulate(runs, OWN), simulate(runs, OWN)
+    (using, _), (coasting, _) = simulate(runs, SHARED), simulate(runs, OWN)
     use = np.ones(runs, dtype=bool)
     for k in range(last + 1):
         if k:

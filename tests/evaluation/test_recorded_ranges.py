@@ -97,7 +97,7 @@ def test_common_epochs_and_games_between_gaps() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not PHONE.is_dir(), reason="../shared/data, real logs for tests, is absent")
 def test_a_phone_in_a_city(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorded_ranges, "SPACING", 300.0)
+    monkeypatch.setattr(recorded_ranges, "SPACING", 600.0)
     monkeypatch.setattr(recorded_ranges, "PULLS", (2.0,))
     report = side_by_side(str(PHONE))
     for row in report["clean"]:
