@@ -111,6 +111,16 @@ def run_folder(text: str) -> Path:
     return Path(text)
 
 
+def add_seed(parser: argparse.ArgumentParser, of: str, default: int = 0) -> None:
+    """The option ``--seed`` of a program; ``of`` says what it seeds: "game 0", say."""
+    parser.add_argument("--seed", type=seed_number, default=default, help=f"of {of} (default: %(default)s)")
+
+
+def add_threads(parser: argparse.ArgumentParser, default: int = 2) -> None:
+    """The option ``--threads`` of a program that simulates."""
+    parser.add_argument("--threads", type=threads, default=default, help="of the simulation (default: %(default)s)")
+
+
 def add_json(parser: argparse.ArgumentParser) -> None:
     """The option ``--json`` of a program that prints rows."""
     parser.add_argument(

@@ -9,7 +9,7 @@ import numpy as np
 
 from spoofgym.calibration.clean_statistics import white_statistics
 from spoofgym.calibration.thresholds import calibrate
-from spoofgym.command_line import Parser, above_one, count, seed_number
+from spoofgym.command_line import Parser, above_one, add_seed, count
 from spoofgym.detectors.chi_square import DEFAULT_ARL0, DEFAULT_WINDOW, Windowed
 from spoofgym.program import program
 
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--arl0", type=above_one, default=DEFAULT_ARL0, help="epochs (default: %(default)s)")
     parser.add_argument("--epochs", type=count, default=1000, help="of a run (default: %(default)s)")
     parser.add_argument("--alarms", type=count, default=5000, help="first alarms that decide (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of the noise (default: %(default)s)")
+    add_seed(parser, "the noise")
     options = parser.parse_args(arguments)
     clean = white_statistics(np.eye(options.dimension), options.epochs)
     detector = Windowed(options.window)

@@ -24,7 +24,7 @@ import numpy as np
 from spoofgym import files, validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks import make_attack
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, count, seed_number
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, count
 from spoofgym.detectors.acna import (
     SONG_JUMP_EPOCHS,
     SONG_JUMP_THRESHOLD,
@@ -234,7 +234,7 @@ def parser() -> argparse.ArgumentParser:
     add = result.add_argument
     add("--scenario", default="song-robot", help="with an odometer (default: %(default)s)")
     add("--runs", type=count, default=10, help="per pair (default: %(default)s)")
-    add("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_seed(result, "run 0")
     add_json(result)
     add_figure(result)
     return result

@@ -20,7 +20,7 @@ from typing import Any
 from rich.console import Console, RenderableType
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, count, picture, seed_number, threads
+from spoofgym.command_line import STDOUT, Parser, above_one, add_figure, add_json, add_seed, add_threads, count, picture
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
@@ -90,8 +90,8 @@ def parser() -> argparse.ArgumentParser:
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear; a log has strapdown only)")
     add("--episodes", type=count,
         help="games of each player (default: 20000 linear, 1000 strapdown; defenders and matrix 4000)")
-    add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
-    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_seed(result, "game 0")
+    add_threads(result)
     add_json(result)
     add_figure(result)
     return result

@@ -22,7 +22,7 @@ from typing import Any
 
 import spoofgym
 from spoofgym import files
-from spoofgym.command_line import Parser, count, seed_number
+from spoofgym.command_line import Parser, add_seed, count
 from spoofgym.console import console
 from spoofgym.evaluation.agent_scores import GAMES, SEED, agent_scores
 from spoofgym.policies.card import Card, layout_digest
@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
     add("run", metavar="RUN", help="run folder of a training")
     add("out", metavar="OUT", type=Path, help="folder of the agent; its name is the agent's")
     add("--games", type=count, default=GAMES, help="for the scores of the card (default: %(default)s)")
-    add("--seed", type=seed_number, default=SEED, help="of game 0 (default: %(default)s)")
+    add_seed(result, "game 0", SEED)
     add("--onnx", action="store_true", help="write policy.onnx, too (extra onnx)")
     return result
 

@@ -17,7 +17,7 @@ from typing import Any
 from spoofgym.calibration import calibrated_all
 from spoofgym.calibration.clean_statistics import joint_statistics
 from spoofgym.calibration.thresholds import Calibration, measure_together
-from spoofgym.command_line import STDOUT, Parser, above_one, add_json, count, seed_number, threads
+from spoofgym.command_line import STDOUT, Parser, above_one, add_json, add_seed, count, threads
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.evaluation.report import SCHEMA_VERSION
@@ -108,7 +108,7 @@ def parser() -> argparse.ArgumentParser:
     add("--detector", action="append", help=f"repeatable (default: {', '.join(NEEDING_SIMULATION)})")
     add("--arl0", type=above_one, nargs="+", default=[1e3], help="epochs (default: 1e3)")
     add("--epochs", type=count, default=1_000_000, help="clean ones of each fidelity (default: %(default)s)")
-    add("--seed", type=seed_number, default=7, help="of the clean runs (default: %(default)s)")
+    add_seed(result, "the clean runs", 7)
     add("--threads", type=threads, default=1, help="that simulate (default: %(default)s)")
     add_json(result)
     return result

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import special
 
 from spoofgym.arrays import Flags, Floats
-from spoofgym.command_line import Parser, add_figure, count, seed_number
+from spoofgym.command_line import Parser, add_figure, add_seed, count
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
@@ -187,7 +187,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Compare protection levels from P and from solution separation, clean and spoofed."""
     parser = Parser(prog="python -m spoofgym.studies.integrity", description=main.__doc__)
     parser.add_argument("--runs", type=count, default=200, help="of each replica (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_seed(parser, "run 0")
     add_figure(parser)
     options = parser.parse_args(arguments)
     print(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")

@@ -17,7 +17,7 @@ from spoofgym import files, validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import EAST, heading
-from spoofgym.command_line import Parser, add_figure, count, seed_number
+from spoofgym.command_line import Parser, add_figure, add_seed, count
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.figures import new_figure
@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Play a patient spoofer against responses: a table, and a figure where one is asked for."""
     parser = Parser(prog="python -m spoofgym.studies.patient_spoofer", description=main.__doc__)
     parser.add_argument("--runs", type=count, default=400, help="per response (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_seed(parser, "run 0")
     add_figure(parser)
     options = parser.parse_args(arguments)
     courses = {response: play(response, options.runs, options.seed) for response in RESPONSES}

@@ -15,7 +15,7 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.profiles import Ramp
-from spoofgym.command_line import Parser, count, seed_number
+from spoofgym.command_line import Parser, add_seed, count
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.loose.adaptation import GUARDS
 from spoofgym.navigation.loose.adaptive import AdaptiveNavigator
@@ -144,7 +144,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Play the self-tuning filter clean and under a ramp, with each guard and both noises, and print tables."""
     parser = Parser(prog="python -m spoofgym.studies.self_tuning", description=main.__doc__)
     parser.add_argument("--runs", type=count, default=400, help="per filter and noise (default: %(default)s)")
-    parser.add_argument("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_seed(parser, "run 0")
     parser.add_argument("--window", type=count, default=50, help="w, fixes (default: %(default)s)")
     parser.add_argument("--rate", type=float, default=3.0, help="of the ramp, m/s per axis (default: %(default)s)")
     parser.add_argument("--guards", nargs="+", choices=GUARDS, metavar="GUARD", default=list(GUARDS),

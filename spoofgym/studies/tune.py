@@ -15,7 +15,7 @@ from typing import Any
 
 from rich.table import Table
 
-from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
+from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, add_threads, count
 from spoofgym.console import console, show
 from spoofgym.evaluation.tuning import tuning_report
 from spoofgym.program import do_all, give_json, program
@@ -31,8 +31,8 @@ def parser() -> argparse.ArgumentParser:
     add = result.add_argument
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
     add("--episodes", type=count, default=4000, help="games of each defender (default: %(default)s)")
-    add("--seed", type=seed_number, default=SEED, help="of game 0 (default: %(default)s)")
-    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_seed(result, "game 0", SEED)
+    add_threads(result)
     add_json(result)
     return result
 

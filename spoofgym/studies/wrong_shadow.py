@@ -13,7 +13,7 @@ from typing import Any
 from rich.table import Table
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number, threads
+from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, add_threads, count
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.attackers import Evaluation
@@ -74,8 +74,8 @@ def parser() -> argparse.ArgumentParser:
     add("--attacker", action="append", default=[], metavar="POLICY",
         help="run folder or name of a trained spoofer; repeatable")
     add("--episodes", type=count, default=4000, help="games of each row (default: %(default)s)")
-    add("--seed", type=seed_number, default=0, help="of game 0 (default: %(default)s)")
-    add("--threads", type=threads, default=2, help="of the simulation (default: %(default)s)")
+    add_seed(result, "game 0")
+    add_threads(result)
     add_json(result)
     return result
 

@@ -15,7 +15,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from spoofgym.command_line import STDOUT, Parser, add_json, count, seed_number
+from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, count
 from spoofgym.console import console
 from spoofgym.program import do_all, give_json, program
 from spoofgym.studies.reproduce import foi_r_5687, kujur_2024, liu_2018, shadmehri_2025, song_2021
@@ -33,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
     add = result.add_argument
     add("paper", choices=sorted(PAPERS), help="whose figures")
     add("--runs", type=count, help=f"of each game (default: {RUNS}, with --quick {QUICK_RUNS})")
-    add("--seed", type=seed_number, default=0, help="of run 0 (default: %(default)s)")
+    add_seed(result, "run 0")
     add("--quick", action="store_true", help="few runs: shows that everything works, and stands for nothing")
     add_json(result)
     return result
