@@ -4,6 +4,7 @@ import ast
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from spoofgym.detectors.base import Detector
@@ -47,9 +48,9 @@ def test_the_blocks_run_and_print_what_the_page_shows():
         printed.append(lines)
     detector = names["detector"]
     assert type(detector).__bases__ == (Detector,)
-    assert detector.arl0_interval[0] < 1e4 < detector.arl0_interval[1]
-    # per axis the variance is 0.1 / 1.9; epochs that were independent would have exp(-t² / 2 s²) = 1e-4
-    independent = (2.0 * (0.1 / 1.9) * 9.21) ** 0.5
+    assert detector.arl0_interval[0] < 5e3 < detector.arl0_interval[1]
+    # per axis the variance is 0.1 / 1.9; epochs that were independent would have exp(-t² / 2 s²) = 1 / 5000
+    independent = (2.0 * (0.1 / 1.9) * np.log(5000.0)) ** 0.5
     assert 0.85 * independent < detector.threshold < independent
     (leaning,), (snapshot,) = (numbers(line) for line in printed[2])
     assert leaning > snapshot + 70
