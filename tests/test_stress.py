@@ -64,7 +64,7 @@ def test_a_wrong_option_is_one_line(option, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [None, 0.5])
+@pytest.mark.parametrize("delay", [None, 0.1])
 def test_ctrl_c_is_one_line(delay, child):
     """At the start of the imports, and in the middle of a game."""
     command = [sys.executable, "-m", "tests.stress", "--steps", "1e9"]

@@ -19,7 +19,7 @@ from spoofgym.policies import baselines
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.studies import evaluate, wrong_shadow
 
-SCENARIO = "kujur-flight:horizon=50,onset=60"
+SCENARIO = "kujur-flight:horizon=44,onset=60"
 WINDOWED = "windowed:n=5,p_fa=1e-4"
 
 
@@ -37,12 +37,12 @@ def test_a_spoofer_is_trained_and_evaluated(tmp_path: Path, capsys: Any, monkeyp
     policy = LearnedSpoofer.load(folder)
     assert policy.act(np.zeros((2, len(policy.layout)), dtype=np.float32)).shape == (2, 4)
     assert "mean clock error" in policy.layout
-    arguments = ["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "40", "--threads", "1"]
+    arguments = ["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "20", "--threads", "1"]
     capsys.readouterr()
     assert evaluate.main([*arguments, "--json", "-"]) == 0
     rows = {row["attacker"]: row for row in json.loads(capsys.readouterr().out)["rows"]}
     assert rows["random"]["detection_probability"] == 1.0
-    assert rows["run"]["episodes"] == 40
+    assert rows["run"]["episodes"] == 20
     assert all(row["fraction_of_optimum"] is None for row in rows.values())
     assert rows["closed-form"]["mean_undetected_error_m"] is None
 
@@ -56,7 +56,7 @@ def test_a_defender_is_taught_trained_and_evaluated(
     monkeypatch.setattr(imitation, "MANY", 1)
     folder = tmp_path / "run"
     short = ["--detector", "snapshot", "--detector", "separation-bank:n=20", "--lanes", "4", "--critic-games", "1"]
-    given = ["--scenario", SCENARIO, *short, "--validation-episodes", "10", "--steps", "400", "--out", str(folder)]
+    given = ["--scenario", SCENARIO, *short, "--validation-episodes", "5", "--steps", "176", "--out", str(folder)]
     assert defender.main(given) == 0
     policy = LearnedDefender.load(folder)
     assert (policy.slots, policy.depths) == (8, 5)
@@ -66,7 +66,7 @@ def test_a_defender_is_taught_trained_and_evaluated(
     monkeypatch.setattr(defenders, "PUBLISHED", ())
     monkeypatch.setattr(defenders, "tuned_for", lambda scenario: [])
     capsys.readouterr()
-    arguments = ["--scenario", SCENARIO, "--defender", str(folder), "--episodes", "20", "--threads", "1"]
+    arguments = ["--scenario", SCENARIO, "--defender", str(folder), "--episodes", "8", "--threads", "1"]
     assert evaluate.main([*arguments, "--json", "-"]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert {"run", "never", "always"} <= {row["defender"] for row in rows}
