@@ -20,6 +20,7 @@ from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import ALERT_LIMITS, Scenario
+from spoofgym.scenarios.flight_rules import flight_rules
 from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade, require_grade
 from spoofgym.sensors.range_fix import range_fix_along
@@ -95,12 +96,8 @@ def kujur_flight(
             f"a horizon of {horizon} epochs at {written(RATE)} Hz"
         )
     hour = validation.hour(owner, "hour", hour)
-    limits = (
-        validation.above(owner, "horizontal_alert_limit", horizontal_alert_limit),
-        validation.above(owner, "vertical_alert_limit", vertical_alert_limit),
-    )
     usual = DRAG_OFF_RATES[coupling]
-    fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
+    rules = flight_rules(owner, drag_off_rate, usual, horizontal_alert_limit, vertical_alert_limit)
     name = spell_changed(
         owner,
         kujur_flight,
@@ -109,9 +106,9 @@ def kujur_flight(
         onset=onset,
         hour=hour,
         imu=imu,
-        horizontal_alert_limit=limits[0],
-        vertical_alert_limit=limits[1],
-        drag_off_rate=None if fastest == usual else fastest,
+        horizontal_alert_limit=rules.alert_limits[0],
+        vertical_alert_limit=rules.alert_limits[1],
+        drag_off_rate=None if rules.fastest == usual else rules.fastest,
     )
     truth = SimulatedTruth(
         name=name,
@@ -120,14 +117,7 @@ def kujur_flight(
         onset=onset,
         horizon=horizon,
     )
-    return Scenario(
-        family=FAMILIES[coupling](truth, hour, imu),
-        drag_off_rate=(fastest,) * 3,
-        error_scale=10.0,
-        defender_scale=50.0,
-        clock_rate=fastest,
-        alert_limits=limits,
-    )
+    return rules.scenario(FAMILIES[coupling](truth, hour, imu))
 
 
 def _tight(truth: SimulatedTruth, hour: float, imu: str) -> TightFamily:

@@ -17,6 +17,7 @@ from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import ALERT_LIMITS, Scenario
+from spoofgym.scenarios.flight_rules import flight_rules
 from spoofgym.scenarios.limits import MOST_EPOCHS, SIGMAS
 from spoofgym.sensors.constellation import gps_24
 from spoofgym.sensors.imu import grade, require_grade
@@ -123,11 +124,7 @@ def liu_flight(
     markov_sigma = validation.non_negative(owner, "markov_sigma", markov_sigma, SIGMAS[1])
     markov_time = validation.zero_or_above(owner, "markov_time", markov_time)
     usual = DRAG_OFF_RATES[coupling]
-    fastest = usual if drag_off_rate is None else validation.above(owner, "drag_off_rate", drag_off_rate)
-    limits = (
-        validation.above(owner, "horizontal_alert_limit", horizontal_alert_limit),
-        validation.above(owner, "vertical_alert_limit", vertical_alert_limit),
-    )
+    rules = flight_rules(owner, drag_off_rate, usual, horizontal_alert_limit, vertical_alert_limit)
     coloured = markov_sigma != 0.0 or markov_time != 0.0
     if coloured and not (markov_sigma and markov_time):
         raise ValueError(
@@ -146,9 +143,9 @@ def liu_flight(
         sigma=sigma,
         noise=noise,
         coupling=coupling,
-        drag_off_rate=None if fastest == usual else fastest,
-        horizontal_alert_limit=limits[0],
-        vertical_alert_limit=limits[1],
+        drag_off_rate=None if rules.fastest == usual else rules.fastest,
+        horizontal_alert_limit=rules.alert_limits[0],
+        vertical_alert_limit=rules.alert_limits[1],
     )
     if coupling == "tight" and (noise != "white" or coloured or sigma != 3.7):
         raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
@@ -156,14 +153,7 @@ def liu_flight(
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
     truth = SimulatedTruth(name=name, trajectory=_trajectory(), rate=rate, onset=onset, horizon=horizon)
     fixes = _Fixes(sigma, markov_sigma, markov_time, noise)
-    return Scenario(
-        family=FAMILIES[coupling](truth, imu, fixes),
-        drag_off_rate=(fastest,) * 3,
-        error_scale=10.0,
-        defender_scale=50.0,
-        clock_rate=fastest,
-        alert_limits=limits,
-    )
+    return rules.scenario(FAMILIES[coupling](truth, imu, fixes))
 
 
 @dataclass(frozen=True)

@@ -113,6 +113,18 @@ def _receiver(noise: str, sigma: float) -> Receiver:
     )
 
 
+def _tuning(encoders: Odometer, sigma: float) -> CredibleTuning:
+    """What the filter believes; ``sigma`` of a fix per axis, m."""
+    return CredibleTuning(
+        step=encoders.step,
+        samples=round(encoders.rate / RATE),
+        acceleration=ACCELERATION * sigma,
+        auxiliary_sigma=AUXILIARY * sigma,
+        fix_sigma=sigma,
+        height_sigma=sigma,
+    )
+
+
 def song_robot(
     data: str = "rectangle",
     noise: str = "markov",
@@ -169,14 +181,7 @@ def song_robot(
         horizon=horizon,
         onset=onset,
     )
-    tuning = CredibleTuning(
-        step=encoders.step,
-        samples=round(encoders.rate / RATE),
-        acceleration=ACCELERATION * sigma,
-        auxiliary_sigma=AUXILIARY * sigma,
-        fix_sigma=sigma,
-        height_sigma=sigma,
-    )
+    tuning = _tuning(encoders, sigma)
     path, speed = PATHS[data]
     truth = PlanarTruth(
         name=name,
