@@ -28,8 +28,8 @@ NOT_NUMERICAL = (
     *("studies/test_trained_on.py", "studies/test_wrong_shadow.py"),
     *("logs/test_table.py", "logs/test_notes.py", "test_house.py", "test_other_kernels.py"),
 )
-"""Left out: programs, learners, who plays, files, words, copies, refused actions, what is kept on disk, and shares of simulated
-games, which rounding does not move. All else is numerical, what is added included."""
+"""Left out: programs, learners, who plays, files, words, copies, refused actions, what is kept on disk, and shares of
+simulated games, which rounding does not move. All else is numerical, what is added included."""
 OLDEST = {"x86_64": "Nehalem", "amd64": "Nehalem", "aarch64": "ARMV8", "arm64": "ARMV8"}
 
 
