@@ -41,6 +41,12 @@ def read(folder: Path, kind: str) -> dict[str, Arrays]:
     return made
 
 
+def names(folder: Path, kind: str) -> list[str]:
+    """Names of the episodes of a kind that were written, for which nothing is built."""
+    with np.load(folder / f"{kind}.npz") as archive:
+        return list(dict.fromkeys(key.split(SEPARATOR)[0] for key in archive.files))
+
+
 def tolerances() -> dict[str, dict[str, float]]:
     """Of every quantity of every episode whose numbers may differ between machines; the others are equal."""
     return json.loads(TOLERANCES.read_text())
