@@ -81,7 +81,7 @@ def _train(options: argparse.Namespace, seed: int, path: Path) -> float | None:
     game = {"detector": options.detector, "knowledge": options.knowledge, "action": options.action}
     settings = {**game, "steps": options.steps, "seed": seed}
     command = [part for name, value in settings.items() for part in (f"--{name}", str(value))] + ["--out", str(path)]
-    folder = RunFolder(path, "spoofgym.learning.spoofer", SpooferConfig, Settings)
+    folder = RunFolder(path, "spoofgym.learning.spoofer", (SpooferConfig,), Settings)
     if folder.holds_run:
         run, state = folder.run(), folder.state()
         folder.refuse_changes(run, settings)

@@ -278,6 +278,8 @@ class _OneSide(DuelGame, OneSeatGame):
 class DuelSpooferGame(_OneSide):
     """N lanes of the duel, the spoofer outside."""
 
+    seat: SpooferSeat
+
     def __init__(self, config: DuelSpooferConfig, num_lanes: int, *, streams: RunStreams | None = None) -> None:
         """Set the game up; arguments and errors as of `DuelGame`."""
         super().__init__(config, num_lanes, defender=config.defender, streams=streams)
@@ -287,6 +289,8 @@ class DuelSpooferGame(_OneSide):
 
 class DuelDefenderGame(_OneSide):
     """N lanes of the duel, the defender outside."""
+
+    seat: DefenderSeat
 
     def __init__(self, config: DuelDefenderConfig, num_lanes: int, *, streams: RunStreams | None = None) -> None:
         """Set the game up; arguments and errors as of `DuelGame`."""

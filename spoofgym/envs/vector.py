@@ -18,8 +18,8 @@ class SpooferVectorEnv(NativeVectorEnv):
     game_type = SpooferGame
 
 
-class _DefendingVectorEnv(NativeVectorEnv):
-    """N lanes of a defender."""
+class DefendingVectorEnv(NativeVectorEnv):
+    """N lanes of a defender's game."""
 
     def action_masks(self) -> Flags:
         """Which values of the actions are open to each lane, (N, M), as `DefenderSeat.action_masks`."""
@@ -27,7 +27,7 @@ class _DefendingVectorEnv(NativeVectorEnv):
         return masks
 
 
-class DefenderVectorEnv(_DefendingVectorEnv):
+class DefenderVectorEnv(DefendingVectorEnv):
     """N lanes of Defender-v0; arguments as `NativeVectorEnv` and those of `spoofgym.envs.defender.DefenderEnv`."""
 
     config_type = DefenderConfig
@@ -41,7 +41,7 @@ class DuelSpooferVectorEnv(NativeVectorEnv):
     game_type = DuelSpooferGame
 
 
-class DuelDefenderVectorEnv(_DefendingVectorEnv):
+class DuelDefenderVectorEnv(DefendingVectorEnv):
     """N lanes of DuelDefender-v0; arguments as `NativeVectorEnv` and `spoofgym.envs.duel_sides.DuelDefenderEnv`."""
 
     config_type = DuelDefenderConfig

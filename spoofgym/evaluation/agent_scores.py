@@ -50,12 +50,27 @@ def agent_scores(policy: LearnedSpoofer | LearnedDefender, games: int = GAMES, s
 
 
 def _score(config: AnyConfig, act: Act, games: int, seed: int) -> Score:
-    opponent, metric, unit = _measured(config)
-    values = np.concatenate([_play(_game(config, streams), act) for streams in batches(games, seed, LANES)])
+    opponent, metric, unit = measured(config)
+    values = play_games(config, act, games, seed)
     return Score(opponent, metric, unit, float(values.mean()), mean_interval(values), games, seed)
 
 
-def _measured(config: AnyConfig) -> tuple[str, str, str]:
+def play_games(config: AnyConfig, act: Act, games: int, seed: int) -> Floats:
+    """What each game of a policy is worth, (games,): undetected error, mean error or harm.
+
+    Args:
+        config: of the environment that it plays in.
+        act: actions for observations (N, D).
+        games: how many; game i is seeded ``seed + i``.
+        seed: of game 0.
+
+    Raises:
+        ValueError: the environment cannot be built, or no games.
+    """
+    return np.concatenate([_play(_game(config, streams), act) for streams in batches(games, seed, LANES)])
+
+
+def measured(config: AnyConfig) -> tuple[str, str, str]:
     """Opponent, metric and unit of a score."""
     if isinstance(config, SpooferConfig):
         given = config.detector if isinstance(config.detector, tuple) else (config.detector,)

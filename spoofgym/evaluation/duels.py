@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from spoofgym.policies.classical import SEPARATOR
 LANES = 1000
 """Games that are played together; what a game is worth does not depend on it."""
 Notify = Callable[[str], None]
+Config = TypeVar("Config", bound=DuelConfig)
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def _name(given: Any, found: str) -> str:
     return given if isinstance(given, str) else found
 
 
-def with_detectors_of(config: DuelConfig, defenders: Sequence[str]) -> DuelConfig:
+def with_detectors_of(config: Config, defenders: Sequence[Any]) -> Config:
     """The duel with the detectors that defenders of the form ``DETECTOR > RESPONSE`` follow, beside its own.
 
     All cells of a matrix are played with the same detectors, so that the same games begin in the same way.
@@ -95,7 +96,8 @@ def with_detectors_of(config: DuelConfig, defenders: Sequence[str]) -> DuelConfi
         defenders: specifications.
     """
     given = config.detectors if isinstance(config.detectors, tuple) else (config.detectors,)
-    followed = [text.partition(SEPARATOR.strip())[0].strip() for text in defenders if SEPARATOR.strip() in text]
+    texts = [text for text in defenders if isinstance(text, str) and SEPARATOR.strip() in text]
+    followed = [text.partition(SEPARATOR.strip())[0].strip() for text in texts]
     return replace(config, detectors=tuple(dict.fromkeys([*given, *followed])))
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -26,9 +26,11 @@ from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import Parser
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
+from spoofgym.envs.duel_config import DuelDefenderConfig
+from spoofgym.evaluation.agent_scores import play_games
 from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.learning import checkpoint
-from spoofgym.learning.defender_ppo import Settings, begin, export, make_learner
+from spoofgym.learning.defender_ppo import AnyDefenderConfig, Settings, begin, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
 from spoofgym.learning.watch import CHECKPOINTS, Watch, mean_return
@@ -56,6 +58,9 @@ def parser() -> argparse.ArgumentParser:
     add("--detector", action="append",
         help=f"whose statistics the defender sees; repeatable (default: {', '.join(DETECTORS)})")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
+    add("--spoofer", metavar="SPEC",
+        help="train in the duel, against this spoofer: ramp:0.5, training, policy:FOLDER, pool:A+B, ...")
+    add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
     add_options(result, "runs/defender")
     for name, value in asdict(Settings()).items():
         kind: Any = _switch if isinstance(value, bool) else type(value)
@@ -70,11 +75,20 @@ def _switch(text: str) -> bool:
 
 
 def asked_run(given: dict[str, Any]) -> Run:
-    """The run that the options of the command line ask for."""
+    """The run that the options of the command line ask for.
+
+    Raises:
+        ValueError: an option of the duel without a spoofer, attacks beside a spoofer, or a part that is not valid.
+    """
     settings = {name: given[name] for name in asdict(Settings()) if name in given}
     arguments: dict[str, Any] = {"detectors": tuple(given.get("detector", DETECTORS))}
-    arguments |= {name: given[name] for name in ("scenario", "attacks", "fidelity", "threads") if name in given}
-    config = configure(DefenderConfig, arguments)
+    names = ("scenario", "attacks", "fidelity", "threads", "spoofer", "payoff")
+    arguments |= {name: given[name] for name in names if name in given}
+    if "payoff" in given and "spoofer" not in given:
+        raise ValueError("--payoff is of a duel: name the --spoofer, too")
+    if "spoofer" in given and "attacks" in given:
+        raise ValueError("--spoofer names who attacks in a duel: leave --attacks out")
+    config: Any = configure(DuelDefenderConfig if "spoofer" in given else DefenderConfig, arguments)
     return Run(config, Settings(**settings), given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
 
 
@@ -82,7 +96,7 @@ def asked_run(given: dict[str, Any]) -> Run:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    folder = RunFolder(options.out, "spoofgym.learning.defender", DefenderConfig, Settings)
+    folder = RunFolder(options.out, "spoofgym.learning.defender", (DefenderConfig, DuelDefenderConfig), Settings)
     return train(options, folder, asked_run, Training)
 
 
@@ -100,10 +114,10 @@ class Training:
             ValueError: the environment cannot be built, or the checkpoint is damaged.
         """
         self._run, self._folder, self._console = run, folder, terminal
-        self._config: DefenderConfig = run.environment
+        self._config: AnyDefenderConfig = run.environment
         with folder.naming_settings():
             self._learner = make_learner(self._config, run.learner, run.seed, folder.path)
-            self._world = _validation_world(self._config)
+            self._harm = _validated(self._config)
         self._validation: Rows = []
         self._best: LearnedDefender | None = None
         self._begun = False
@@ -159,10 +173,7 @@ class Training:
     def _validate(self, learner: PPO) -> None:
         """Play validation games; the policy is kept if it is the best so far."""
         policy = export(learner, self._config, self._folder.path)
-        episodes = play_policy(
-            self._world, self._config, policy.act, self._run.learner.validation_episodes, VALIDATION_SEED
-        )
-        error = float(episodes.error.mean())
+        error = self._harm(policy, self._run.learner.validation_episodes)
         if error < min((row["mean_error_m"] for row in self._validation), default=math.inf):
             self._best = policy
         self._validation.append({"steps": learner.num_timesteps, "mean_error_m": error})
@@ -218,6 +229,14 @@ class Training:
             return "no validation yet"
         best = min(self._validation, key=lambda row: row["mean_error_m"])
         return f"best policy at {best['steps']:,} steps: {best['mean_error_m']:.3f} m in validation"
+
+
+def _validated(config: AnyDefenderConfig) -> Callable[[LearnedDefender, int], float]:
+    """What measures a policy in so many validation games: its mean error, m, or in a duel its harm."""
+    if isinstance(config, DuelDefenderConfig):
+        return lambda policy, games: float(play_games(config, policy.act, games, VALIDATION_SEED).mean())
+    world = _validation_world(config)
+    return lambda policy, games: float(play_policy(world, config, policy.act, games, VALIDATION_SEED).error.mean())
 
 
 def _validation_world(config: DefenderConfig) -> World:

@@ -18,21 +18,24 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
+from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 from torch import nn
 
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_seat import EXCLUDE
+from spoofgym.envs.duel_config import DuelDefenderConfig
 from spoofgym.envs.sb3 import SB3VecEnv
-from spoofgym.envs.vector import DefenderVectorEnv
+from spoofgym.envs.vector import DefenderVectorEnv, DefendingVectorEnv, DuelDefenderVectorEnv
 from spoofgym.learning import limits
 from spoofgym.learning.imitation import imitate
 from spoofgym.learning.ppo import LAST_RATE, arrays
+from spoofgym.learning.scaled_rewards import ScaledRewards, duel_factor
 from spoofgym.policies.learned import SLOT_FIELD, LearnedDefender
 
 TEACHING_LANES = 256
 EXCLUDING_FIELD = "last decision was to exclude"
+AnyDefenderConfig = DefenderConfig | DuelDefenderConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +101,7 @@ class Settings:
 class PrivilegedVecEnv(SB3VecEnv):
     """The defender's lanes with the privileged state behind each observation."""
 
-    def __init__(self, vector_env: DefenderVectorEnv) -> None:
+    def __init__(self, vector_env: DefendingVectorEnv) -> None:
         """Widen the observations of ``vector_env``."""
         super().__init__(vector_env)
         width = len(vector_env.game.fields) + len(vector_env.game.privileged.fields)
@@ -204,25 +207,7 @@ class DefenderPolicy(ActorCriticPolicy):
         return log_probability, entropy
 
 
-class ScaledRewards(VecEnvWrapper):
-    """Rewards times a factor: returns of the order of one, so that the critic's gradient does not drown the actor's."""
-
-    def __init__(self, venv: VecEnv, factor: float) -> None:
-        """Scale the rewards of ``venv``."""
-        super().__init__(venv)
-        self._factor = factor
-
-    def reset(self) -> VecEnvObs:
-        """Start new episodes in all lanes."""
-        return self.venv.reset()
-
-    def step_wait(self) -> VecEnvStepReturn:
-        """One step of all lanes."""
-        observation, reward, done, infos = self.venv.step_wait()
-        return observation, self._factor * reward, done, infos
-
-
-def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: Path) -> PPO:
+def make_learner(config: AnyDefenderConfig, settings: Settings, seed: int, folder: Path) -> PPO:
     """A PPO learner on ``settings.lanes`` lanes of the game, seeded; TensorBoard writes into ``folder``."""
     vector = lanes(config, settings)
     horizon = vector.game.scenario.timeline.num_epochs
@@ -230,7 +215,7 @@ def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: 
     adapted = PrivilegedVecEnv(vector) if settings.privileged else SB3VecEnv(vector)
     return PPO(
         DefenderPolicy,
-        ScaledRewards(VecMonitor(adapted), settings.reward_scale),
+        ScaledRewards(VecMonitor(adapted), settings.reward_scale * duel_factor(config, vector.game.scenario)),
         n_steps=horizon,
         batch_size=max(1, settings.lanes * horizon // settings.minibatches),
         n_epochs=settings.epochs,
@@ -251,13 +236,14 @@ def make_learner(config: DefenderConfig, settings: Settings, seed: int, folder: 
     )
 
 
-def lanes(config: DefenderConfig, settings: Settings) -> DefenderVectorEnv:
+def lanes(config: AnyDefenderConfig, settings: Settings) -> DefendingVectorEnv:
     """The lanes of a training."""
     trained = replace(config, clean=settings.clean)
-    return DefenderVectorEnv(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(trained))
+    kind = DuelDefenderVectorEnv if isinstance(config, DuelDefenderConfig) else DefenderVectorEnv
+    return kind(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(trained))
 
 
-def begin(learner: PPO, config: DefenderConfig, settings: Settings, seed: int) -> None:
+def begin(learner: PPO, config: AnyDefenderConfig, settings: Settings, seed: int) -> None:
     """Teach the policy a classical defender's actions, then the critic that policy's returns."""
     imitate(learner, lanes(config, replace(settings, lanes=TEACHING_LANES)), seed)
     policy = learner.policy
@@ -269,9 +255,9 @@ def begin(learner: PPO, config: DefenderConfig, settings: Settings, seed: int) -
         parameter.requires_grad_(True)
 
 
-def export(learner: PPO, config: DefenderConfig, folder: Path) -> LearnedDefender:
+def export(learner: PPO, config: AnyDefenderConfig, folder: Path) -> LearnedDefender:
     """The learner's policy as plain arrays."""
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
-    vector: DefenderVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
+    vector: DefendingVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]
     layout = tuple(field.name for field in vector.game.fields)
     return LearnedDefender(folder, dict(vars(config)), layout, *arrays(layers))

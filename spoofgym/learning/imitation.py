@@ -18,7 +18,8 @@ from stable_baselines3 import PPO
 from torch.nn import functional
 
 from spoofgym.envs.defender_game import DefenderGame
-from spoofgym.envs.vector import DefenderVectorEnv
+from spoofgym.envs.duel_game import DuelDefenderGame
+from spoofgym.envs.vector import DefendingVectorEnv
 from spoofgym.responses.onset_depth import DEFAULT_MARGIN
 
 GAMES = 4
@@ -45,7 +46,7 @@ class Teacher:
     depth: int | None
     reuse: int
 
-    def act(self, game: DefenderGame) -> NDArray[np.int64]:
+    def act(self, game: DefenderGame | DuelDefenderGame) -> NDArray[np.int64]:
         """What it does in the present epoch, (N, 2 + S); it leaves no single satellite out."""
         features = game.seat.features
         if self.depth is None:
@@ -59,14 +60,14 @@ class Teacher:
         return action
 
 
-def best_teacher(vector: DefenderVectorEnv, seed: int) -> Teacher:
+def best_teacher(vector: DefendingVectorEnv, seed: int) -> Teacher:
     """The one whose error is least on common games: all are tried on a few, the best quarter on many."""
     teachers = [Teacher(depth, reuse) for depth in (None, *range(len(vector.game.seat.depths))) for reuse in REUSES]
     tried = sorted(teachers, key=lambda teacher: total_error(vector, teacher, FEW, seed))
     return min(tried[: -(-len(tried) // 4)], key=lambda teacher: total_error(vector, teacher, MANY, seed))
 
 
-def total_error(vector: DefenderVectorEnv, teacher: Teacher, games: int, seed: int) -> float:
+def total_error(vector: DefendingVectorEnv, teacher: Teacher, games: int, seed: int) -> float:
     """Sum of the errors of all decisions in ``games`` of every lane, m."""
     vector.reset(seed=seed)
     total = 0.0
@@ -77,7 +78,7 @@ def total_error(vector: DefenderVectorEnv, teacher: Teacher, games: int, seed: i
 
 
 def examples(
-    vector: DefenderVectorEnv, teacher: Teacher, seed: int
+    vector: DefendingVectorEnv, teacher: Teacher, seed: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Observations (n, D) of games that a teacher plays, and its actions (n, 2 + S)."""
     rng = np.random.default_rng(seed)
@@ -94,7 +95,7 @@ def examples(
     return np.concatenate(observations), np.concatenate(actions)
 
 
-def imitate(learner: PPO, vector: DefenderVectorEnv, seed: int) -> float:
+def imitate(learner: PPO, vector: DefendingVectorEnv, seed: int) -> float:
     """Teach the learner's policy the best teacher's actions; the share of its decisions that then agree.
 
     Args:

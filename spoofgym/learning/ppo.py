@@ -15,15 +15,18 @@ import torch
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.duel_config import DuelSpooferConfig
 from spoofgym.envs.sb3 import SB3VecEnv
-from spoofgym.envs.vector import SpooferVectorEnv
+from spoofgym.envs.vector import DuelSpooferVectorEnv, SpooferVectorEnv
 from spoofgym.learning import limits
 from spoofgym.learning.expected_alarm import ExpectedAlarmVectorEnv, alarm_probability_is_known
+from spoofgym.learning.scaled_rewards import ScaledRewards, duel_factor
 from spoofgym.policies.learned import LearnedSpoofer
 
+AnySpooferConfig = SpooferConfig | DuelSpooferConfig
 LAST_RATE = 0.02
 """Share of the learning rate at which its fall ends: the last rollout overshoots the number of steps."""
 
@@ -73,11 +76,13 @@ class Settings:
         )
 
 
-def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: Path) -> PPO:
+def make_learner(config: AnySpooferConfig, settings: Settings, seed: int, folder: Path) -> PPO:
     """A PPO learner on ``settings.lanes`` lanes of the game, seeded; TensorBoard writes into ``folder``."""
     vector = _lanes(config, settings.lanes)
     horizon = vector.game.scenario.timeline.num_epochs
-    environment = VecMonitor(SB3VecEnv(vector))
+    environment: VecEnv = VecMonitor(SB3VecEnv(vector))
+    if isinstance(config, DuelSpooferConfig):
+        environment = ScaledRewards(environment, duel_factor(config, vector.game.scenario) / horizon)
     return PPO(
         "MlpPolicy",
         environment,
@@ -96,14 +101,16 @@ def make_learner(config: SpooferConfig, settings: Settings, seed: int, folder: P
     )
 
 
-def _lanes(config: SpooferConfig, lanes: int) -> SpooferVectorEnv:
+def _lanes(config: AnySpooferConfig, lanes: int) -> SpooferVectorEnv | DuelSpooferVectorEnv:
     """The game, with alarms in expectation where their probability is known."""
+    if isinstance(config, DuelSpooferConfig):
+        return DuelSpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
     if alarm_probability_is_known(config):
         return ExpectedAlarmVectorEnv(lanes, config, autoreset_mode=AutoresetMode.SAME_STEP)
     return SpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
 
 
-def export(learner: PPO, config: SpooferConfig, folder: Path) -> LearnedSpoofer:
+def export(learner: PPO, config: AnySpooferConfig, folder: Path) -> LearnedSpoofer:
     """The learner's policy as plain arrays."""
     layers = [*learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
     vector: SpooferVectorEnv = learner.get_env().unwrapped.vector_env  # type: ignore[union-attr]

@@ -27,9 +27,9 @@ from spoofgym.command_line import (
     run_folder,
     threads,
 )
-from spoofgym.envs.trained import config_from
+from spoofgym.envs.trained import ENVIRONMENTS, config_from
 from spoofgym.learning import checkpoint
-from spoofgym.policies.learned import CONFIG_FILE, read_config
+from spoofgym.policies.learned import CONFIG_FILE, environment_of, read_config
 
 CHECKPOINT_FILE = "checkpoint.pt"
 DEFAULT_STEPS = 3_200_000
@@ -66,8 +66,8 @@ class Run:
         """Every setting by the name of its option."""
         content = self.content()
         settings = {**content["environment"], **content["learner"], "seed": self.seed, "steps": self.steps}
-        if "detectors" in settings:
-            settings["detector"] = list(settings["detectors"])
+        watched: Any = settings.get("detectors", settings.get("detector"))
+        settings["detector"] = [watched] if isinstance(watched, str) else list(watched)
         return settings
 
 
@@ -92,20 +92,20 @@ class RunFolder:
         path: of the folder.
     """
 
-    def __init__(self, path: Path, program: str, environment: type, learner: type) -> None:
+    def __init__(self, path: Path, program: str, environments: tuple[type, ...], learner: type) -> None:
         """A folder that may hold a run.
 
         Args:
             path: of the folder.
             program: that trains, for messages.
-            environment: type of the configuration of the environment.
+            environments: types of the configurations of environments on which it trains.
             learner: type of the settings of the learner.
 
         Raises:
             ValueError: nothing can be written there.
         """
         files.check_folder(path)
-        self.path, self._program, self._types = path, program, (environment, learner)
+        self.path, self._program, self._environments, self._learner = path, program, environments, learner
 
     @property
     def holds_run(self) -> bool:
@@ -140,9 +140,12 @@ class RunFolder:
         if not self.holds_run:
             raise ValueError(f"{self.path} holds no run to resume: it has no {CONFIG_FILE}")
         path = self.path / CONFIG_FILE
-        environment_type, learner_type = self._types
-        content = read_config(self.path)
-        environment: Any = config_from(environment_type, content["environment"], path)
+        learner_type, content = self._learner, read_config(self.path)
+        with files.reading(path):
+            found = ENVIRONMENTS[environment_of(content["environment"])]
+        # an environment of the other side is refused by the name of this one
+        kind: Any = found if found in self._environments else self._environments[0]
+        environment: Any = config_from(kind, content["environment"], path)
         with files.reading(path):
             known = {field.name for field in fields(learner_type)}
             if set(content["learner"]) != known:

@@ -1,6 +1,7 @@
 """Train a PPO spoofer.
 
     python -m spoofgym.learning.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --out runs/x
+    python -m spoofgym.learning.spoofer --scenario foi-drive --defender "snapshot > px4-auto" --out runs/y
 
 Writes into the run folder: what the policy is trained on (``config.json``), the policy (``policy.npz``, arrays only),
 TensorBoard logs, and checkpoints from which ``--resume`` goes on. Ctrl-C stops after the present step and leaves a
@@ -21,8 +22,10 @@ from stable_baselines3 import PPO
 
 from spoofgym import files
 from spoofgym.attacks.base import KNOWLEDGE
-from spoofgym.command_line import Parser, count
+from spoofgym.command_line import Parser, count, share
 from spoofgym.envs.config import ACTIONS, SpooferConfig, configure
+from spoofgym.envs.duel_config import DuelSpooferConfig
+from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.learning import checkpoint
 from spoofgym.learning.ppo import Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
@@ -41,20 +44,39 @@ def parser() -> argparse.ArgumentParser:
     )
     add = result.add_argument
     add("--scenario", help="what is flown: liu-flight, kujur-flight, ... (default: liu-flight)")
-    add("--detector", help="snapshot, windowed:n=20, ... (default: snapshot)")
+    add("--detector", action="append", help="snapshot, windowed:n=20, ...; repeatable (default: snapshot)")
     add("--knowledge", choices=KNOWLEDGE, help="of the victim (default: shadow)")
     add("--action", choices=ACTIONS, help="what the policy controls (default: rate)")
     add("--frames", type=count, help="epochs that the policy sees at once (default: 1)")
     add("--shadow", metavar="SPEC", help="scenario whose filter the spoofer takes for the victim's (default: its own)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
+    add("--defender", metavar="SPEC",
+        help="train in the duel, against this defender: 'snapshot > exclude', px4-auto, policy:FOLDER, pool:A+B, ...")
+    add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
+    add("--clean", type=share, help="share of clean games in the duel, which teach a spoofer nothing (default: 0)")
     add_options(result, "runs/spoofer")
     return result
 
 
 def asked_run(given: dict[str, Any]) -> Run:
-    """The run that the options of the command line ask for."""
-    arguments = {name: value for name, value in given.items() if name not in ("seed", "steps")}
-    config = configure(SpooferConfig, arguments)
+    """The run that the options of the command line ask for.
+
+    Raises:
+        ValueError: an option of the duel without a defender, or a part that is not valid.
+    """
+    arguments = {name: value for name, value in given.items() if name not in ("seed", "steps", "detector")}
+    detectors = tuple(given.get("detector", ()))
+    config: Any
+    if "defender" in arguments:
+        duel = configure(DuelSpooferConfig, {"clean": 0.0, "detectors": detectors or "snapshot", **arguments})
+        config = with_detectors_of(duel, (duel.defender,))
+    else:
+        for name in ("payoff", "clean"):
+            if name in arguments:
+                raise ValueError(f"--{name} is of a duel: name the --defender, too")
+        if detectors:
+            arguments["detector"] = detectors[0] if len(detectors) == 1 else detectors
+        config = configure(SpooferConfig, arguments)
     return Run(config, Settings(), given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
 
 
@@ -62,7 +84,7 @@ def asked_run(given: dict[str, Any]) -> Run:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    folder = RunFolder(options.out, "spoofgym.learning.spoofer", SpooferConfig, Settings)
+    folder = RunFolder(options.out, "spoofgym.learning.spoofer", (SpooferConfig, DuelSpooferConfig), Settings)
     return train(options, folder, asked_run, Training)
 
 
@@ -103,10 +125,14 @@ class Training:
         if state is not None:
             self._place = self._read(state)
             self._learner = self._present()
-        scale = float(self._learner.get_env().unwrapped.vector_env.game.scenario.error_scale)  # type: ignore[union-attr]
-        self._watch = Watch(
-            run.steps, terminal, lambda present: f"mean gain {mean_return(present) * scale:.1f} m", self._keep
-        )
+        self._watch = Watch(run.steps, terminal, self._told, self._keep)
+
+    def _told(self, learner: PPO) -> str:
+        """What the bar says of a learner."""
+        game: Any = learner.get_env().unwrapped.vector_env.game  # type: ignore[union-attr]
+        if isinstance(self._run.environment, DuelSpooferConfig):
+            return f"mean harm {mean_return(learner):.3g} {'' if game.harm.payoff.unit != 'm' else 'm'}".rstrip()
+        return f"mean gain {mean_return(learner) * game.scenario.error_scale:.1f} m"
 
     def train(self) -> bool:
         """Train to the end; whether Ctrl-C came before it."""

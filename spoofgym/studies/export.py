@@ -32,8 +32,11 @@ from spoofgym.policies.recipe import Recipe
 from spoofgym.program import program
 
 OPTIONS = {
-    SPOOFER: ("scenario", "detector", "knowledge", "action", "frames", "shadow", "fidelity"),
-    "defender": ("scenario", "attacks", "detectors", "fidelity"),
+    SPOOFER: (
+        *("scenario", "detector", "detectors", "knowledge", "action", "frames", "shadow", "fidelity"),
+        *("defender", "payoff", "clean"),
+    ),
+    "defender": ("scenario", "attacks", "detectors", "fidelity", "spoofer", "payoff"),
 }
 """Arguments of an environment that are options of the program that trains on it."""
 

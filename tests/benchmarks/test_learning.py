@@ -34,9 +34,8 @@ def trainings(tmp_path, monkeypatch):
 
 
 def begun(tmp_path, finished=None):
-    folder = RunFolder(
-        tmp_path / "runs" / "learning" / "snapshot-shadow-rate-0", "spoofgym.learning.spoofer", SpooferConfig, Settings
-    )
+    path = tmp_path / "runs" / "learning" / "snapshot-shadow-rate-0"
+    folder = RunFolder(path, "spoofgym.learning.spoofer", (SpooferConfig,), Settings)
     folder.begin(Run(SpooferConfig(), Settings(), 0, 1000))
     (folder.path / "policy.npz").write_bytes(b"a policy of a run that was stopped")
     if finished is not None:

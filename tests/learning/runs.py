@@ -25,7 +25,7 @@ DEFENDER = Run(
     240,
 )
 PROGRAMS = {"spoofer": (spoofer, SPOOFER), "expected": (spoofer, EXPECTED), "defender": (defender, DEFENDER)}
-TYPES = {spoofer: (SpooferConfig, ppo.Settings), defender: (DefenderConfig, defender_ppo.Settings)}
+TYPES = {spoofer: ((SpooferConfig,), ppo.Settings), defender: ((DefenderConfig,), defender_ppo.Settings)}
 
 DRIVE, STEPS = "foi-drive:horizon=60", 480
 SHORT = ["--scenario", DRIVE, "--detector", "snapshot", "--lanes", "4", "--validation-episodes", "20"]

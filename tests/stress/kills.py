@@ -35,8 +35,8 @@ RUNS = {
     ),
 }
 TYPES = {
-    "spoofgym.learning.spoofer": (SpooferConfig, ppo.Settings),
-    "spoofgym.learning.defender": (DefenderConfig, defender_ppo.Settings),
+    "spoofgym.learning.spoofer": ((SpooferConfig,), ppo.Settings),
+    "spoofgym.learning.defender": ((DefenderConfig,), defender_ppo.Settings),
 }
 MOST_KILLS = 6
 """Of one training; then it may come to its end."""
