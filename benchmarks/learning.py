@@ -84,7 +84,7 @@ def _train(options: argparse.Namespace, seed: int, path: Path) -> float | None:
     folder = RunFolder(path, "spoofgym.learning.spoofer", (SpooferConfig,), Settings)
     if folder.holds_run:
         run, state = folder.run(), folder.state()
-        folder.refuse_changes(run, settings)
+        folder.refuse_changes(run, {**settings, "detector": [options.detector]})
         if state is None or not folder.finished(run, state):
             _succeed(spoofer.main([*command, "--resume"]))
         return None
