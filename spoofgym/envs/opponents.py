@@ -3,6 +3,7 @@
 Each has a specification:
 
 - ``ramp:0.5``, ``exclude``, ...: an attack or a response by its registered name;
+- ``unseen:BUDGET``: the optimal attack of `spoofgym.policies.unseen`;
 - ``policy:NAME`` or ``policy:FOLDER``: a learned policy, published or in a run folder;
 - ``DETECTOR > RESPONSE``: a response that follows the alarm of one of the game's detectors alone;
 - ``pool:A+B+C`` or ``pool:A+B+C,weights=2+1+1``: a pool, from which every run draws its opponent. Within it ``/``
@@ -29,14 +30,17 @@ from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
 from spoofgym.policies.classical import SEPARATOR
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.policies.published import POLICY, policy_folder
+from spoofgym.policies.unseen import Unseen
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
 from spoofgym.responses.pool import ResponsePool
 from spoofgym.responses.watching import Watching
 from spoofgym.scenario import Scenario
-from spoofgym.specification import Specification, unnest
+from spoofgym.specification import Specification, build, unnest
 
 POOL = "pool:"
+OPTIMAL: dict[str, Callable[..., Attack]] = {"unseen": Unseen}
+"""Optimal attacks, which stand below the registry of attacks."""
 Part = TypeVar("Part")
 
 
@@ -53,6 +57,8 @@ def make_spoofer(given: str | Attack) -> Attack:
         return AttackPool([(make_spoofer(part), weight) for part, weight in _written(given)], 0.0, given.strip())
     if isinstance(given, str) and given.strip().startswith(POLICY):
         return PolicySpoofer(LearnedSpoofer.load(policy_folder(given)), given.strip())
+    if isinstance(given, str) and Specification.parse(given).name in OPTIMAL:
+        return build(given, OPTIMAL, "attack")
     return make_attack(given, lambda nested: make_spoofer(_unnested(nested)))
 
 

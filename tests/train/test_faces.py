@@ -26,7 +26,7 @@ def run(*command):
     return subprocess.run([sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("name", ["spoofer", "defender"])
+@pytest.mark.parametrize("name", ["spoofer", "defender", "league"])
 def test_a_face_is_the_program_of_the_package(name):
     face = importlib.import_module(f"train.{name}")
     assert face.main is importlib.import_module(f"spoofgym.learning.{name}").main

@@ -1,0 +1,127 @@
+"""Play a league: both sides learn against each other, and the table says who can be exploited by how much.
+
+    python -m spoofgym.learning.league --scenario foi-drive --out runs/league
+    python -m spoofgym.learning.league --scenario foi-drive --payoff beyond:50 --rounds 3 --out runs/beyond
+
+The league begins with scripted and optimal spoofers and with every classical defender. Each round fills the payoff
+matrix, solves it, and trains a best response of each side to the other's mixture; those that gain are taken in. The
+folder holds ``league.json`` (what the league is), ``rounds.json`` (every matrix, mixture and value), the games of all
+cells, and the policies. A league that was stopped goes on with the same command.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from spoofgym.attacks.base import KNOWLEDGE
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, count, run_folder, seed_number, share, threads
+from spoofgym.console import console, show
+from spoofgym.envs.duel_config import DuelConfig
+from spoofgym.evaluation.defenders import fits
+from spoofgym.evaluation.duels import with_detectors_of
+from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
+from spoofgym.learning.best_response import BestResponse
+from spoofgym.learning.double_oracle import League, LeagueSettings
+from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WORLD_DETECTORS, tuned_for
+from spoofgym.program import do_all, give_json, program
+from spoofgym.scenario import Scenario
+from spoofgym.scenarios import make_scenario
+from spoofgym.studies.league_presentation import league_figure, league_tables
+
+SPOOFERS = (
+    *("ramp:0.1", "ramp:0.2", "ramp:0.5", "ramp:1", "ramp:2", "jump:20", "training"),
+    *("unseen:4", "unseen:16", "unseen:64"),
+)
+YARDSTICKS = ("always-use", "always-exclude")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    description = "Let both sides learn against each other, and compare all."
+    result = Parser(prog="python -m spoofgym.learning.league", description=description)
+    add = result.add_argument
+    add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
+    add("--payoff", default="error", metavar="SPEC", help="error, error:CAP or beyond:LIMIT (default: %(default)s)")
+    add("--knowledge", choices=KNOWLEDGE, default="shadow", help="of learned spoofers (default: %(default)s)")
+    add("--clean", type=share, default=0.5, help="share of games without an attack (default: %(default)s)")
+    add("--rounds", type=count, default=5, help="of best responses (default: %(default)s)")
+    add("--games", type=count, default=500, help="of each cell (default: %(default)s)")
+    add("--meta", choices=tuple(META_STRATEGIES), default="nash", help="how a side is mixed (default: %(default)s)")
+    add("--spoofer-steps", type=count, default=1_600_000, help="of each spoofer's training (default: %(default)s)")
+    add("--defender-steps", type=count, default=800_000, help="of each defender's training (default: %(default)s)")
+    add("--spoofer", action="append", metavar="SPEC",
+        help="who spoofs at the beginning; repeatable (default: ramps, a jump, the training attacks, optimal ones)")
+    add("--defender", action="append", metavar="SPEC",
+        help="who defends at the beginning; repeatable (default: every published and tuned one, and two yardsticks)")
+    add("--detector", action="append", metavar="SPEC",
+        help="whose statistics both sides may see; repeatable (default: those of the evaluations of defenders)")
+    add("--seed", type=seed_number, default=0, help="of all random numbers (default: %(default)s)")
+    add("--resamples", type=count, default=RESAMPLES,
+        help="of the games, for the interval of the value (default: %(default)s)")
+    add("--threads", type=threads, default=1, help="of learners and simulations (default: %(default)s)")
+    add("--out", type=run_folder, default=Path("runs/league"), help="folder of the league (default: %(default)s)")
+    add_json(result)
+    add_figure(result)
+    return result
+
+
+def classical_defenders(scenario: Scenario) -> tuple[str, ...]:
+    """Every classical defender that fits a scenario, and the yardsticks, as they are spelled."""
+    listed = [*PUBLISHED, *tuned_for(scenario.name)]
+    spelled = [f"{each.detector}{SEPARATOR}{each.response}" for each in listed if fits(each.detector, scenario)]
+    return (*dict.fromkeys(spelled), *YARDSTICKS)
+
+
+def settings_of(options: argparse.Namespace) -> LeagueSettings:
+    """The league that the options ask for.
+
+    Raises:
+        ValueError: a part that is unknown or does not fit.
+    """
+    scenario = make_scenario(options.scenario)
+    defenders = tuple(options.defender or classical_defenders(scenario))
+    duel = DuelConfig(
+        scenario=options.scenario,
+        detectors=tuple(options.detector or (name for name in WORLD_DETECTORS if fits(name, scenario))),
+        knowledge=options.knowledge,
+        payoff=options.payoff,
+        clean=options.clean,
+        threads=options.threads,
+    )
+    return LeagueSettings(
+        duel=with_detectors_of(duel, defenders),
+        spoofers=tuple(options.spoofer or SPOOFERS),
+        defenders=defenders,
+        rounds=options.rounds,
+        games=options.games,
+        meta=options.meta,
+        seed=options.seed,
+        resamples=options.resamples,
+    )
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    terminal = console(stderr=True)
+    settings = settings_of(options)
+    train = BestResponse(settings.duel, terminal, options.spoofer_steps, options.defender_steps)
+    rounds = League(settings, options.out, train).play(lambda text: terminal.print(text, soft_wrap=True))
+    report = {"kind": "league", **settings.content(), "results": [each.content() for each in rounds]}
+    tables = league_tables(report)
+    output = console(stderr=options.json == STDOUT)
+    do_all(
+        *(partial(show, output, table) for table in tables),
+        lambda: give_json(report, options.json),
+        lambda: league_figure(report, options.figure) if options.figure is not None else None,
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

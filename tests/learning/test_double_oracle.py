@@ -1,0 +1,166 @@
+"""Leagues: a tiny game whose every best response is enumerated, resumption from any kill, and what is refused."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spoofgym.envs.duel_config import DuelConfig
+from spoofgym.envs.opponents import POOL
+from spoofgym.evaluation.duels import harms, play_matrix, with_detectors_of
+from spoofgym.evaluation.payoff import nash, nash_conv
+from spoofgym.learning.double_oracle import ROUNDS_FILE, SETTINGS_FILE, League, LeagueSettings, mixture
+from spoofgym.specification import Specification, unnest
+from spoofgym.studies.league_presentation import league_figure, league_tables
+from tests.run_folders import spoofer
+
+SPOOFERS = ("ramp:0.3,direction=90", "ramp:1,direction=90", "ramp:4,direction=90")
+DEFENDERS = ("snapshot > exclude:reuse=5", "windowed:n=5,threshold=25 > latch", "always-exclude")
+QUIET = {"clean": 0.3, "outage": 0.0, "multipath": 0.0}
+DUEL = with_detectors_of(DuelConfig(scenario="foi-drive:horizon=60", detectors=("snapshot",), **QUIET), DEFENDERS)
+SETTINGS = LeagueSettings(
+    duel=DUEL, spoofers=SPOOFERS[:1], defenders=DEFENDERS[:1], rounds=5, games=40, seed=3, resamples=20
+)
+
+
+@pytest.fixture(scope="module")
+def whole() -> np.ndarray:
+    """The payoff of every spoofer against every defender."""
+    cells = play_matrix(DUEL, SPOOFERS, DEFENDERS, SETTINGS.games, SETTINGS.seed)
+    return harms(cells).mean(axis=2)
+
+
+def enumerating(whole: np.ndarray) -> Callable[..., str]:
+    """A trainer that knows the whole game: the best response is looked up."""
+
+    def best(side: str, opponent: str, folder: Path, seed: int) -> str:
+        names, weights = [opponent], [1.0]
+        if opponent.startswith(POOL):
+            given = Specification.parse(opponent)
+            names = [unnest(part) for part in str(given.value).split("+")]
+            weights = [float(weight) for weight in given.options["weights"].split("+")]
+        others = DEFENDERS if side == "spoofer" else SPOOFERS
+        shares = np.zeros(len(others))
+        for name, weight in zip(names, weights, strict=True):
+            shares[others.index(name)] = weight
+        if side == "spoofer":
+            return SPOOFERS[int((whole @ shares).argmax())]
+        return DEFENDERS[int((shares @ whole).argmin())]
+
+    return best
+
+
+def test_it_finds_the_equilibrium_of_the_enumerated_game(whole: np.ndarray, tmp_path: Path) -> None:
+    rounds = League(SETTINGS, tmp_path, enumerating(whole)).play()
+    last, exact = rounds[-1], nash(whole)
+    assert last.mixtures.value == pytest.approx(exact.value, rel=1e-9)
+    spread = [np.zeros(3), np.zeros(3)]
+    for shares, names, found in (
+        (spread[0], SPOOFERS, zip(last.spoofers, last.mixtures.spoofers, strict=True)),
+        (spread[1], DEFENDERS, zip(last.defenders, last.mixtures.defenders, strict=True)),
+    ):
+        for name, share in found:
+            shares[names.index(name)] = share
+    assert nash_conv(whole, *spread) == pytest.approx(0.0, abs=1e-9 * whole.max())
+    # nobody who gains nothing is taken in, and nobody twice
+    assert len(set(last.spoofers)) == len(last.spoofers)
+    assert len(set(last.defenders)) == len(last.defenders)
+    assert not any(gain["joins"] for gain in rounds[-2].gains.values())
+    rows = [SPOOFERS.index(name) for name in last.spoofers]
+    columns = [DEFENDERS.index(name) for name in last.defenders]
+    np.testing.assert_allclose(last.mean, whole[np.ix_(rows, columns)], rtol=1e-12)
+    np.testing.assert_allclose(last.worst, last.mean.max(axis=0), rtol=0)
+
+
+@pytest.mark.parametrize("kill", [1, 2, 3, 4])
+def test_a_league_that_is_killed_goes_on(kill: int, whole: np.ndarray, tmp_path: Path) -> None:
+    """In its training number ``kill``. Nothing is played twice, and the end is as if nothing had happened."""
+    settings = replace(SETTINGS, rounds=2)
+    League(settings, tmp_path / "once", enumerating(whole)).play()
+    best, calls = enumerating(whole), []
+
+    def killed(*arguments: Any) -> str:
+        calls.append(arguments)
+        if len(calls) == kill:
+            raise KeyboardInterrupt
+        return best(*arguments)
+
+    told: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        League(settings, tmp_path / "twice", killed).play(told.append)
+    League(settings, tmp_path / "twice", best).play(told.append)
+    played = [line for line in told if " against " in line and "trained" not in line]
+    assert len(set(played)) == len(played)
+    for name in (SETTINGS_FILE, ROUNDS_FILE):
+        assert (tmp_path / "once" / name).read_text() == (tmp_path / "twice" / name).read_text()
+
+
+def test_another_league_is_refused(whole: np.ndarray, tmp_path: Path) -> None:
+    best = enumerating(whole)
+    League(replace(SETTINGS, rounds=0), tmp_path, best).play()
+    League(replace(SETTINGS, rounds=1), tmp_path, best).play()  # more rounds are the same league
+    other = replace(SETTINGS, duel=replace(DUEL, payoff="beyond:5"))
+    with pytest.raises(ValueError, match=r"holds another league: its duel\.payoff is 'error', not 'beyond:5'"):
+        League(other, tmp_path, best)
+    content = json.loads((tmp_path / SETTINGS_FILE).read_text())
+    (tmp_path / SETTINGS_FILE).write_text(json.dumps({**content, "schema_version": 9}))
+    with pytest.raises(ValueError, match="is of version 9; this program plays version 1"):
+        League(SETTINGS, tmp_path, best)
+    (tmp_path / SETTINGS_FILE).write_text("{")
+    with pytest.raises(ValueError, match=re.escape(f"{SETTINGS_FILE} is damaged")):
+        League(SETTINGS, tmp_path, best)
+
+
+def test_a_damaged_cell_is_named(whole: np.ndarray, tmp_path: Path) -> None:
+    League(replace(SETTINGS, rounds=0), tmp_path, enumerating(whole)).play()
+    (cell,) = (tmp_path / "cells").iterdir()
+    cell.write_bytes(cell.read_bytes()[:-5])
+    with pytest.raises(ValueError, match=re.escape(f"{cell.name} is damaged")):
+        League(replace(SETTINGS, rounds=0), tmp_path, enumerating(whole)).play()
+
+
+def test_a_frozen_policy_stays_as_it_is(tmp_path: Path) -> None:
+    text = spoofer({"scenario": "foi-drive:horizon=60", "knowledge": "blind"}, tmp_path / "x")
+    settings = replace(SETTINGS, spoofers=(text,), rounds=0)
+    League(settings, tmp_path / "league", lambda *_: text).play()
+    file = tmp_path / "x" / "policy.npz"
+    arrays = dict(np.load(file))
+    np.savez(file, **{**arrays, "bias_0": arrays["bias_0"] + np.float32(1.0)})
+    with pytest.raises(ValueError, match="is not the policy that this league has played: its weights have changed"):
+        League(settings, tmp_path / "league", lambda *_: text).play()
+
+
+def test_mixtures_are_spelled_as_pools() -> None:
+    assert mixture(SPOOFERS, np.array([0.0, 1.0, 0.0])) == SPOOFERS[1]
+    found = mixture(("ramp:1,direction=90", "policy:runs/a"), np.array([0.25, 0.75]))
+    assert found == "pool:ramp:1/direction=90+policy:runs/a,weights=0.25+0.75"
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"spoofers": ()}, "at least one spoofer and one defender"),
+        ({"games": 1}, "games must be"),
+        ({"meta": "best"}, "meta must be"),
+        ({"rounds": -1}, "rounds must be"),
+    ],
+)
+def test_settings_that_are_none_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(SETTINGS, **changes)
+
+
+def test_tables_and_the_figure_tell_who_is_exploited(whole: np.ndarray, tmp_path: Path) -> None:
+    rounds = League(replace(SETTINGS, rounds=3), tmp_path, enumerating(whole)).play()
+    report = {**SETTINGS.content(), "results": [each.content() for each in rounds]}
+    values, spoofing, defending, worst = league_tables(report)
+    assert values.row_count == 4
+    assert spoofing.row_count >= 1 <= defending.row_count
+    assert worst.row_count == len(rounds[-1].defenders) + 1  # the mixture is a defender, too
+    league_figure(report, tmp_path / "league.png")
+    assert (tmp_path / "league.png").stat().st_size > 10_000
