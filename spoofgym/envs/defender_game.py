@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.arrays import Flags, Runs
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_seat import DefenderOutcome, DefenderSeat, demands_on
+from spoofgym.envs.monitors import make_monitors, require_fitting
 from spoofgym.envs.opponents import spoofer_pool
 from spoofgym.envs.privileged import PrivilegedState
 from spoofgym.envs.view import OneSeatGame
-from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation
@@ -65,10 +64,9 @@ class DefenderGame(OneSeatGame):
         self.config = config
         with validation.argument(OWNER, "scenario"):
             scenario = make_scenario(config.scenario, config.coupling)
-        own = _own_detectors(config, scenario)
+        own = make_monitors(OWNER, "detectors", config.detectors)
+        require_fitting(own, scenario)
         names = [detector.name for detector in own]
-        if len(set(names)) < len(names):
-            raise ValueError(f"{OWNER}: detectors: each detector can be given once only, got {', '.join(names)}")
         detectors = [deepcopy(detector) for detector in beside] or calibrated_for_play(
             own, scenario, config.fidelity
         )
@@ -114,20 +112,3 @@ class DefenderGame(OneSeatGame):
         """
         self.advance(decisions=actions, restarting=restarting)
         return self.seat.outcome
-
-
-def _own_detectors(config: DefenderConfig, scenario: Scenario) -> list[Detector]:
-    """The detectors that the defender sees, without thresholds yet.
-
-    Raises:
-        ValueError: one is unknown or needs what the scenario does not give.
-    """
-    given = config.detectors if isinstance(config.detectors, tuple | list) else (config.detectors,)
-    with validation.argument(OWNER, "detectors"):
-        # copies: an object that the caller gives to two environments must not carry memories between them
-        detectors = [deepcopy(make_detector(part)) for part in given]
-    for detector in detectors:
-        scenario.facts.require(
-            f"detector {detector.name!r}", detector.needs, "choose others: detectors=('snapshot', 'windowed:n=5')"
-        )
-    return detectors

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,12 +14,12 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.pool import AttackPool
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.defender_seat import DefenderSeat, demands_on
 from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.game import Game
 from spoofgym.envs.harm import Harm
+from spoofgym.envs.monitors import make_monitors, require_fitting
 from spoofgym.envs.opponents import make_defender, spoofer_pool
 from spoofgym.envs.payoffs import make_payoff
 from spoofgym.envs.privileged import PrivilegedState
@@ -310,16 +309,9 @@ def _detectors(config: DuelConfig, scenario: Scenario, num_lanes: int) -> list[D
         ValueError: one is unknown, given twice, or needs what the scenario does not give; or the spoofer's seat does
             not fit.
     """
-    given = config.detectors if isinstance(config.detectors, tuple | list) else (config.detectors,)
-    with validation.argument(OWNER, "detectors"):
-        # copies: an object that the caller gives to two environments must not carry memories between them
-        detectors = [deepcopy(make_detector(part)) for part in given]
-        names = [detector.name for detector in detectors]
-        if len(set(names)) < len(names):
-            raise ValueError(f"each detector can be given once only, got {', '.join(names)}")
-        for detector in detectors:
-            hint = "choose others: detectors=('snapshot', 'windowed:n=5')"
-            scenario.facts.require(f"detector {detector.name!r}", detector.needs, hint)
+    detectors = make_monitors(OWNER, "detectors", config.detectors)
+    require_fitting(detectors, scenario)
+    names = [detector.name for detector in detectors]
     # refuses what does not fit before thresholds are looked for
     frame_fields(config.spoofer_side, scenario, names, num_lanes, config.sees_decisions)
     with validation.argument(OWNER, "detectors"):

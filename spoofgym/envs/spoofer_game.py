@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.arrays import Runs
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.detectors import make_detector
 from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.monitors import make_monitors
 from spoofgym.envs.opponents import make_defender
 from spoofgym.envs.spoofer_seat import OWNER, SpooferOutcome, SpooferSeat, frame_fields
 from spoofgym.envs.view import OneSeatGame
@@ -46,13 +45,8 @@ class SpooferGame(OneSeatGame):
         self.config = config
         with validation.argument(OWNER, "scenario"):
             scenario = make_scenario(config.scenario, config.coupling)
-        given = config.detector if isinstance(config.detector, tuple | list) else (config.detector,)
-        with validation.argument(OWNER, "detector"):
-            # copies: an object that the caller gives to two environments must not carry memories between them
-            detectors = [deepcopy(make_detector(part)) for part in given]
+        detectors = make_monitors(OWNER, "detector", config.detector)
         names = [detector.name for detector in detectors]
-        if len(set(names)) < len(names):
-            raise ValueError(f"{OWNER}: detector: each detector can be given once only, got {', '.join(names)}")
         frame_fields(config, scenario, names, num_lanes)  # refuses what does not fit before thresholds are looked for
         with validation.argument(OWNER, "detector"):
             detectors = calibrated_for_play(detectors, scenario, config.fidelity)
