@@ -30,6 +30,7 @@ from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
 from spoofgym.policies.classical import SEPARATOR
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.policies.published import POLICY, policy_folder
+from spoofgym.policies.unseen import NAME as UNSEEN
 from spoofgym.policies.unseen import Unseen
 from spoofgym.responses import make_response
 from spoofgym.responses.base import Response
@@ -39,7 +40,7 @@ from spoofgym.scenario import Scenario
 from spoofgym.specification import Specification, build, unnest
 
 POOL = "pool:"
-OPTIMAL: dict[str, Callable[..., Attack]] = {"unseen": Unseen}
+OPTIMAL: dict[str, Callable[..., Attack]] = {UNSEEN: Unseen}
 """Optimal attacks, which stand below the registry of attacks."""
 Part = TypeVar("Part")
 

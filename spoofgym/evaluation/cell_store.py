@@ -57,7 +57,8 @@ class CellStore:
 
     def _key(self, spoofer: str, defender: str) -> str:
         """Digest of all that decides the games."""
-        content = [asdict(self._config), self._games, self._seed, _identity(spoofer), _identity(defender)]
+        duel = {name: value for name, value in asdict(self._config).items() if name != "threads"}
+        content = [duel, self._games, self._seed, _identity(spoofer), _identity(defender)]
         return hashlib.sha256(json.dumps(content, default=str, sort_keys=True).encode()).hexdigest()[:32]
 
 

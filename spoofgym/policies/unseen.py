@@ -14,6 +14,7 @@ from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.gain import game_gain
 from spoofgym.specification import spell
 
+NAME = "unseen"
 LARGEST_BUDGET = 1e9
 
 
@@ -33,12 +34,12 @@ class Unseen(Attack):
     knowledge = "shadow"
 
     def __init__(self, budget: float) -> None:
-        self._budget = validation.non_negative("unseen", "budget", budget, LARGEST_BUDGET)
+        self._budget = validation.non_negative(NAME, "budget", budget, LARGEST_BUDGET)
 
     @property
     def name(self) -> str:
         """The specification that builds this attack."""
-        return spell("unseen", self._budget)
+        return spell(NAME, self._budget)
 
     def study(self, model: LinearModel) -> None:
         """Compute the offsets for the victim's linear model.
