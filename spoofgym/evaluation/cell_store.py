@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from spoofgym import files
 from spoofgym.archive import read_arrays
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.duels import Cell, play_cell
+from spoofgym.evaluation.engine import Engine, Task
 from spoofgym.policies.learned import load_policy
 from spoofgym.policies.published import POLICY, policy_folder
 
@@ -34,13 +35,12 @@ class CellStore:
         """
         self._folder, self._config, self._games, self._seed = folder, config, games, seed
 
-    def cell(self, spoofer: str, defender: str, notify: Callable[[str], None] = lambda _: None) -> Cell:
+    def cell(self, spoofer: str, defender: str) -> Cell:
         """The games of a spoofer against a defender, from the folder or played now.
 
         Args:
             spoofer: its specification.
             defender: its specification.
-            notify: told what is played.
 
         Raises:
             ValueError: a player that is unknown or does not fit, or a damaged file.
@@ -48,18 +48,49 @@ class CellStore:
         path = self._folder / f"{self._key(spoofer, defender)}.npz"
         if path.exists():
             return _read(path, spoofer, defender, self._games)
-        notify(f"{spoofer} against {defender}")
         played = play_cell(self._config, spoofer, defender, self._games, self._seed)
         packed = io.BytesIO()
         np.savez(packed, harm=played.harm, clean=played.clean)
         files.write_bytes(path, packed.getvalue())
         return played
 
+    def holds(self, spoofer: str, defender: str) -> bool:
+        """Whether the games of a cell have been played.
+
+        Raises:
+            ValueError: a policy that cannot be read.
+        """
+        return (self._folder / f"{self._key(spoofer, defender)}.npz").exists()
+
+    def matrix(
+        self, spoofers: Sequence[str], defenders: Sequence[str], engine: Engine, notify: Callable[[str], None]
+    ) -> list[list[Cell]]:
+        """The cells of every spoofer (a row each) against every defender (a column each).
+
+        Args:
+            spoofers: specifications.
+            defenders: specifications.
+            engine: plays what has not been played.
+            notify: told each cell that is played.
+
+        Raises:
+            ValueError: as `cell`.
+            RuntimeError: a failure of the engine.
+        """
+        missing = [(one, two) for one in spoofers for two in defenders if not self.holds(one, two)]
+        engine.run([Task(f"{one} against {two}", _keep, (self, one, two)) for one, two in missing], notify)
+        return [[self.cell(one, two) for two in defenders] for one in spoofers]
+
     def _key(self, spoofer: str, defender: str) -> str:
         """Digest of all that decides the games."""
         duel = {name: value for name, value in asdict(self._config).items() if name != "threads"}
         content = [duel, self._games, self._seed, _identity(spoofer), _identity(defender)]
         return hashlib.sha256(json.dumps(content, default=str, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def _keep(store: CellStore, spoofer: str, defender: str) -> None:
+    """Play a cell that stays on disk; nothing of it has to travel between processes."""
+    store.cell(spoofer, defender)
 
 
 def _identity(player: str) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 import torch
 from rich.console import Console
 
+from spoofgym.console import console
 from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.duel_game import SPOOFER
 from spoofgym.learning import defender, defender_ppo, ppo, spoofer
@@ -22,7 +23,7 @@ class BestResponse:
 
     Attributes:
         duel: its arguments.
-        terminal: where progress is shown.
+        shows: whether progress is shown on a terminal.
         spoofer_steps: epochs that a spoofer plays in its training.
         defender_steps: epochs that a defender plays in its training.
         spoofer_settings: of the spoofers' learner.
@@ -30,7 +31,7 @@ class BestResponse:
     """
 
     duel: DuelConfig
-    terminal: Console
+    shows: bool
     spoofer_steps: int
     defender_steps: int
     spoofer_settings: ppo.Settings = field(default_factory=ppo.Settings)
@@ -58,9 +59,12 @@ class BestResponse:
         elif kept.run() != run:
             raise ValueError(f"{folder} holds another training than that of this league")
         state = kept.state()
-        if (state is None or not kept.finished(run, state)) and train(run, kept, self.terminal).train():
+        if (state is None or not kept.finished(run, state)) and train(run, kept, self._terminal()).train():
             raise KeyboardInterrupt
         return f"{POLICY}{folder}"
+
+    def _terminal(self) -> Console:
+        return console(stderr=True) if self.shows else Console(quiet=True)
 
     def _spoofer(self, opponent: str, folder: Path, seed: int) -> tuple[Run, RunFolder, Any]:
         # a clean game teaches a spoofer nothing

@@ -10,7 +10,7 @@ McMahan, Gordon and Blum 2003 (double oracle); Lanctot et al. 2017 (policy-space
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -22,6 +22,7 @@ from spoofgym.arrays import Floats
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DEFENDER, SPOOFER
 from spoofgym.evaluation.cell_store import CellStore
+from spoofgym.evaluation.engine import Engine, Here, Notify, Task
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.evaluation.payoff import (
     META_STRATEGIES,
@@ -157,19 +158,23 @@ class League:
         folder: where everything lies.
     """
 
-    def __init__(self, settings: LeagueSettings, folder: Path, train: Trainer) -> None:
+    def __init__(
+        self, settings: LeagueSettings, folder: Path, train: Trainer, engine: Engine | None = None
+    ) -> None:
         """Begin a league, or go on with the one in the folder.
 
         Args:
             settings: what it is.
             folder: of the league.
             train: trains best responses.
+            engine: plays cells and trains; None = here, one after the other.
 
         Raises:
             ValueError: the folder holds another league, or one of another version; or nothing can be written there.
         """
         files.check_folder(folder)
         self.settings, self.folder, self._train = settings, folder, train
+        self._engine: Engine = Here() if engine is None else engine
         path = folder / SETTINGS_FILE
         if path.exists():
             _check_same(path, settings.content())
@@ -177,7 +182,7 @@ class League:
             files.write_json(path, settings.content())
         self._cells = CellStore(folder / "cells", settings.duel, settings.games, settings.seed)
 
-    def play(self, notify: Callable[[str], None] = lambda _: None) -> list[Round]:
+    def play(self, notify: Notify = lambda _: None) -> list[Round]:
         """Play all rounds; what each found.
 
         Args:
@@ -200,11 +205,11 @@ class League:
         return rounds
 
     def _solve(
-        self, number: int, players: dict[str, list[str]], notify: Callable[[str], None]
+        self, number: int, players: dict[str, list[str]], notify: Notify
     ) -> tuple[Round, Floats]:
         """Fill the matrix and solve it; the round, and the harm of every game, (S, D, G)."""
         spoofers, defenders = players[SPOOFER], players[DEFENDER]
-        cells = [[self._cells.cell(one, two, notify) for two in defenders] for one in spoofers]
+        cells = self._cells.matrix(spoofers, defenders, self._engine, notify)
         harms: Floats = np.array([[cell.harm for cell in row] for row in cells])
         mean = harms.mean(axis=2)
         mixtures = META_STRATEGIES[self.settings.meta](mean)
@@ -231,37 +236,41 @@ class League:
         players: dict[str, list[str]],
         solved: Round,
         harms: Floats,
-        notify: Callable[[str], None],
+        notify: Notify,
     ) -> dict[str, dict[str, Any]]:
         """Train a best response of each side, and take in those that gain; what each gained."""
         mixtures, gains = solved.mixtures, {}
-        sides = (
-            (SPOOFER, players[DEFENDER], mixtures.defenders, 1.0),
-            (DEFENDER, players[SPOOFER], mixtures.spoofers, -1.0),
-        )
-        mixed = np.einsum("s,sdg,d->g", mixtures.spoofers, harms, mixtures.defenders)
-        joining = {}
-        for place, (side, others, weights, sign) in enumerate(sides):
+        sides = {
+            SPOOFER: (players[DEFENDER], mixtures.defenders, 1.0),
+            DEFENDER: (players[SPOOFER], mixtures.spoofers, -1.0),
+        }
+        tasks = []
+        for place, (side, (others, weights, _)) in enumerate(sides.items()):
             pool = mixture(others, weights)
-            notify(f"round {number + 1}: a {side} is trained against {pool}")
             seed = int(np.random.SeedSequence((self.settings.seed, number, place)).generate_state(1)[0])
-            new = self._train(side, pool, self.folder / "policies" / f"{side}-{number + 1}", seed)
-            against = [(other, weight) for other, weight in zip(others, weights.tolist(), strict=True) if weight]
-            harm = np.sum([weight * self._harm(side, new, other, notify) for other, weight in against], axis=0)
-            low, high = mean_interval(sign * (harm - mixed))
+            run = self.folder / "policies" / f"{side}-{number + 1}"
+            name = f"round {number + 1}: a {side} is trained against {pool}"
+            tasks.append(Task(name, self._train, (side, pool, run, seed)))
+        trained = dict(zip(sides, self._engine.run(tasks, notify), strict=True))
+        mixed = np.einsum("s,sdg,d->g", mixtures.spoofers, harms, mixtures.defenders)
+        for side, (others, weights, sign) in sides.items():
+            new, gained = trained[side], sign * (self._against(side, trained[side], others, weights, notify) - mixed)
+            low, high = mean_interval(gained)
             joins = bool(low > ROUNDING * solved.mean.max())
-            gain = float((sign * (harm - mixed)).mean())
-            gains[side] = {"player": new, "gain": gain, "gain_ci95": [low, high], "joins": joins}
-            if joins:
-                joining[side] = new
-        for side, new in joining.items():
-            players[side].append(new)
+            gains[side] = {"player": new, "gain": float(gained.mean()), "gain_ci95": [low, high], "joins": joins}
+        for side, gain in gains.items():
+            if gain["joins"]:
+                players[side].append(gain["player"])
         return gains
 
-    def _harm(self, side: str, new: str, other: str, notify: Callable[[str], None]) -> Floats:
-        """Harm of each game of a new player of one side against another of the other, (G,)."""
-        pair = (new, other) if side == SPOOFER else (other, new)
-        return self._cells.cell(*pair, notify).harm
+    def _against(self, side: str, new: str, others: Sequence[str], weights: Floats, notify: Notify) -> Floats:
+        """Harm of each game of a new player of one side against the mixture of the other, in the mean, (G,)."""
+        pairs = [(other, weight) for other, weight in zip(others, weights.tolist(), strict=True) if weight]
+        met = [other for other, _ in pairs]
+        rows, columns = ([new], met) if side == SPOOFER else (met, [new])
+        cells = [cell for row in self._cells.matrix(rows, columns, self._engine, notify) for cell in row]
+        summed: Floats = np.sum([weight * cell.harm for (_, weight), cell in zip(pairs, cells, strict=True)], axis=0)
+        return summed
 
     def _frozen(self) -> dict[str, str]:
         """Digests of the policies of rounds that have been played."""

@@ -23,6 +23,7 @@ from spoofgym.console import console, show
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.defenders import fits
 from spoofgym.evaluation.duels import with_detectors_of
+from spoofgym.evaluation.engine import ENGINES, Engine, Here, make_engine
 from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import League, LeagueSettings
@@ -62,11 +63,31 @@ def parser() -> argparse.ArgumentParser:
     add("--seed", type=seed_number, default=0, help="of all random numbers (default: %(default)s)")
     add("--resamples", type=count, default=RESAMPLES,
         help="of the games, for the interval of the value (default: %(default)s)")
+    add_engine(result)
     add("--threads", type=threads, default=1, help="of learners and simulations (default: %(default)s)")
     add("--out", type=run_folder, default=Path("runs/league"), help="folder of the league (default: %(default)s)")
     add_json(result)
     add_figure(result)
     return result
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """The options that say where games are played and policies trained."""
+    add = parser.add_argument
+    add("--engine", choices=ENGINES, default=ENGINES[0],
+        help="where it is computed: processes of this machine, or a Ray cluster (default: %(default)s)")
+    add("--workers", type=count, help="processes (default: one for each core)")
+    add("--address", metavar="URL", help="of a Ray cluster, ray://HOST:PORT (default: a Ray of this machine)")
+
+
+def engine_of(options: argparse.Namespace) -> Engine:
+    """The engine that the options ask for.
+
+    Raises:
+        ValueError: options that do not fit each other, or an address that does not answer.
+        ImportError: Ray is missing.
+    """
+    return make_engine(options.engine, options.workers, options.address)
 
 
 def classical_defenders(scenario: Scenario) -> tuple[str, ...]:
@@ -110,8 +131,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     terminal = console(stderr=True)
     settings = settings_of(options)
-    train = BestResponse(settings.duel, terminal, options.spoofer_steps, options.defender_steps)
-    rounds = League(settings, options.out, train).play(lambda text: terminal.print(text, soft_wrap=True))
+    engine = engine_of(options)
+    train = BestResponse(settings.duel, isinstance(engine, Here), options.spoofer_steps, options.defender_steps)
+    rounds = League(settings, options.out, train, engine).play(partial(terminal.print, soft_wrap=True))
     report = {"kind": "league", **settings.content(), "results": [each.content() for each in rounds]}
     tables = league_tables(report)
     output = console(stderr=options.json == STDOUT)

@@ -7,7 +7,6 @@ import pytest
 
 pytest.importorskip("torch")
 
-from spoofgym.console import console
 from spoofgym.learning import defender_ppo, league, ppo
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import ROUNDS_FILE
@@ -31,7 +30,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("quick")
 def test_a_league_trains_compares_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = ["--json", str(tmp_path / "out.json"), "--figure", str(tmp_path / "out.png")]
-    command = [*SHORT, *PLAYERS, "--resamples", "20", "--out", str(tmp_path / "league"), *files]
+    command = [*SHORT, *PLAYERS, "--resamples", "20", "--workers", "1", "--out", str(tmp_path / "league"), *files]
     assert league.main(command) == 0
     printed = capsys.readouterr()
     assert "worst case found" in printed.out
@@ -53,7 +52,7 @@ def test_a_run_of_another_training_is_refused(tmp_path: Path) -> None:
     options = league.parser().parse_args([*SHORT, *PLAYERS])
     duel = league.settings_of(options).duel
     settings = (ppo.Settings(lanes=4, trials=1), defender_ppo.Settings(lanes=4, imitate=False, validation_episodes=10))
-    train = BestResponse(duel, console(), 200, 200, *settings)
+    train = BestResponse(duel, False, 200, 200, *settings)
     assert train("spoofer", "always-use", tmp_path / "x", 1) == f"policy:{tmp_path / 'x'}"
     with pytest.raises(ValueError, match="holds another training than that of this league"):
         train("spoofer", "always-exclude", tmp_path / "x", 1)
@@ -68,6 +67,8 @@ def test_a_run_of_another_training_is_refused(tmp_path: Path) -> None:
         (["--spoofer", "nobody"], "unknown attack 'nobody'"),
         (["--meta", "best"], "--meta"),
         (["--clean", "2"], "--clean"),
+        (["--engine", "ray", "--workers", "2"], "leave workers=2 out"),
+        (["--address", "ray://there:1"], "is of the engine 'ray'"),
     ],
 )
 def test_bad_options_are_one_line(
