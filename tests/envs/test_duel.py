@@ -186,6 +186,16 @@ def test_a_spoofer_that_knows_all_sees_what_was_decided() -> None:
     assert "last fix used" not in [field.name for field in duel.parallel_env(**SHORT).game.seats["spoofer"].fields]
 
 
+def test_pettingzoo_makes_it_by_its_id() -> None:
+    pettingzoo = pytest.importorskip("pettingzoo", minversion="1.27")
+    made = pettingzoo.make("parallel", duel.ID, **SHORT)
+    one, two = trace(made, SEED), trace(duel.parallel_env(**SHORT), SEED)
+    assert all((a == b).all() for a, b in zip(one, two, strict=True))
+    cycle = pettingzoo.make("aec", duel.ID, **SHORT)
+    cycle.reset(seed=SEED)
+    assert cycle.agent_selection == "spoofer"
+
+
 def test_a_picture_is_drawn() -> None:
     env = duel.parallel_env(**SHORT, render_mode="rgb_array")
     env.reset(seed=SEED)
