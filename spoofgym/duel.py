@@ -4,8 +4,8 @@
 - `env`, `raw_env`: the agent-environment cycle, one after the other; `env` wants actions in the right order.
 - `vector_env`: N duels in one batch.
 
-All take the arguments of `spoofgym.envs.duel.DuelParallelEnv`, whose page tells the rules. PettingZoo 1.27 and newer make
-it by its id: ``pettingzoo.make("parallel", "spoofgym/duel-v0")`` after ``import spoofgym.duel``.
+All take the arguments of `spoofgym.envs.duel.DuelParallelEnv`, whose page tells the rules. PettingZoo 1.27 makes it by
+its id: ``pettingzoo.make("parallel", "spoofgym/duel-v0")`` after ``import spoofgym.duel``.
 """
 
 from __future__ import annotations
