@@ -1,5 +1,6 @@
 """The code blocks of the README run as they stand."""
 
+import pydoc
 import re
 from pathlib import Path
 
@@ -11,6 +12,17 @@ BLOCKS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), 
 
 def test_there_are_blocks():
     assert len(BLOCKS) >= 3
+
+
+PAGES = re.findall(r'`help\("([a-z_.]+)"\)`', README.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_that_help_shows_is_about_the_environment(page):
+    """No page prints NumPy's own documentation of an array that the module happens to hold."""
+    text = pydoc.render_doc(page, renderer=pydoc.plaintext)
+    assert "## Observation Space" in text
+    assert "ndarray(shape" not in text
 
 
 @pytest.mark.parametrize("place", range(len(BLOCKS)))

@@ -25,6 +25,8 @@ except ImportError as error:
         "the duel of two agents needs PettingZoo: pip install 'spoofgym[multiagent]'"
     ) from error
 
+__all__ = ["DuelParallelEnv"]
+
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, Any]]
 

@@ -93,9 +93,19 @@ class DuelSpooferConfig(DuelConfig):
 
     defender: str | Response | tuple[Weighted[Response], ...] = "exclude"
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.defender is None:
+            raise ValueError("duel: defender must be a specification, a Response or a pool of them, got None")
+
 
 @dataclass(frozen=True, kw_only=True)
 class DuelDefenderConfig(DuelConfig):
     """Arguments of DuelDefender-v0: those of the duel, and who spoofs."""
 
     spoofer: str | Attack | tuple[Weighted[Attack], ...] = "training"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.spoofer is None:
+            raise ValueError("duel: spoofer must be a specification, an Attack or a pool of them, got None")

@@ -24,7 +24,7 @@ from spoofgym import validation
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.pool import POPULATIONS, AttackPool
-from spoofgym.detectors import make_detector
+from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
 from spoofgym.policies.classical import SEPARATOR
@@ -32,7 +32,7 @@ from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.policies.published import POLICY, policy_folder
 from spoofgym.policies.unseen import NAME as UNSEEN
 from spoofgym.policies.unseen import Unseen
-from spoofgym.responses import make_response
+from spoofgym.responses import RESPONSES, make_response
 from spoofgym.responses.base import Response
 from spoofgym.responses.pool import ResponsePool
 from spoofgym.responses.watching import Watching
@@ -106,6 +106,8 @@ def make_defender(given: Any, scenario: Scenario, detectors: Sequence[Detector])
     if isinstance(given, str) and SEPARATOR.strip() in given:
         watcher, _, response = (part.strip() for part in given.partition(SEPARATOR.strip()))
         return Watching(make_defender(response, scenario, detectors), make_detector(watcher).name, detectors)
+    if isinstance(given, str) and (name := given.partition(":")[0].strip()) in DETECTORS and name not in RESPONSES:
+        raise ValueError(f"{given!r} is a detector: name the response to its alarm, too, e.g. '{given} > exclude'")
     return copy.deepcopy(make_response(given))
 
 
@@ -149,10 +151,13 @@ def _written(text: str) -> list[tuple[str, float]]:
     Raises:
         ValueError: an unknown option, or weights that are no numbers or as many as there are parts.
     """
+    spelling = f"{text!r}: a pool is spelled pool:A+B or pool:A+B,weights=2+1"
+    if not text.strip().removeprefix(POOL).strip():
+        raise ValueError(spelling)
     specification = Specification.parse(text)
     unknown = sorted(set(specification.options) - {"weights"})
     if specification.value is None or unknown:
-        raise ValueError(f"{text!r}: a pool is spelled pool:A+B or pool:A+B,weights=2+1")
+        raise ValueError(spelling)
     parts = [_unnested(part) for part in specification.value.split("+")]
     written = specification.options.get("weights")
     weights = ["1"] * len(parts) if written is None else written.split("+")

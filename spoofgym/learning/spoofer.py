@@ -62,13 +62,15 @@ def asked_run(given: dict[str, Any]) -> Run:
     """The run that the options of the command line ask for.
 
     Raises:
-        ValueError: an option of the duel without a defender, or a part that is not valid.
+        ValueError: an option of the duel without a defender, no game with an attack, or a part that is not valid.
     """
     arguments = {name: value for name, value in given.items() if name not in ("seed", "steps", "detector")}
     detectors = tuple(given.get("detector", ()))
     config: Any
     if "defender" in arguments:
         duel = configure(DuelSpooferConfig, {"clean": 0.0, "detectors": detectors or "snapshot", **arguments})
+        if duel.clean == 1.0:
+            raise ValueError("--clean 1 makes every game a clean one, which teaches a spoofer nothing: give less")
         config = with_detectors_of(duel, (duel.defender,))
     else:
         for name in ("payoff", "clean"):

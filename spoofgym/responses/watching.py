@@ -27,7 +27,8 @@ class Watching(Response):
         """
         found = [item for item in detectors if item.name == detector]
         if not found:
-            raise ValueError(f"no detector {detector!r}; there are: {', '.join(item.name for item in detectors)}")
+            names = ", ".join(item.name for item in detectors)
+            raise ValueError(f"no detector {detector!r}; there are: {names}; a response follows a detector of its game")
         self._response = response
         self._detector = detector
         self._threshold = require_threshold(found[0])

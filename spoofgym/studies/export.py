@@ -25,8 +25,16 @@ from spoofgym import files
 from spoofgym.command_line import Parser, add_seed, count
 from spoofgym.console import console
 from spoofgym.evaluation.agent_scores import GAMES, SEED, agent_scores
-from spoofgym.policies.card import Card, layout_digest
-from spoofgym.policies.learned import SPOOFER, LearnedDefender, LearnedSpoofer, environment_of, load_policy, read_config
+from spoofgym.policies.card import CARD_FILE, Card, layout_digest
+from spoofgym.policies.learned import (
+    CONFIG_FILE,
+    SPOOFER,
+    LearnedDefender,
+    LearnedSpoofer,
+    environment_of,
+    load_policy,
+    read_config,
+)
 from spoofgym.policies.published import policy_folder
 from spoofgym.policies.recipe import Recipe
 from spoofgym.program import program
@@ -61,6 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ValueError(f"{out} exists already: choose another folder")
     folder = policy_folder(options.run)
+    if (folder / CARD_FILE).is_file() and not (folder / CONFIG_FILE).is_file():
+        raise ValueError(f"{folder} is an agent already: name the run folder of its training")
     policy, run = load_policy(folder), read_config(folder)
     terminal = console()
     with terminal.status(f"playing {options.games} games"):

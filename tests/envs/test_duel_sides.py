@@ -136,6 +136,12 @@ def test_sides_pass_the_checkers_and_lanes_are_games_of_their_own(side: str, arg
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("side", "seat"), [("DuelSpoofer", "defender"), ("DuelDefender", "spoofer")])
+def test_the_other_seat_cannot_stay_empty(side: str, seat: str) -> None:
+    with pytest.raises(ValueError, match=f"duel: {seat} must be a specification, .* got None"):
+        gym.make(f"spoofgym/{side}-v0", scenario=DRIVE, **{seat: None})
+
+
 @pytest.mark.parametrize("filler", ["snapshot > px4-auto", "policy"])
 def test_sb3_learns_the_spoofers_side(filler: str, tmp_path: Path) -> None:
     ppo = pytest.importorskip("stable_baselines3").PPO

@@ -77,6 +77,7 @@ def test_a_run_can_be_lengthened(trained: Path, capsys: pytest.CaptureFixture[st
     [
         (spoofer, ["--payoff", "error"], "--payoff is of a duel: name the --defender, too"),
         (spoofer, ["--clean", "0.5"], "--clean is of a duel: name the --defender, too"),
+        (spoofer, ["--defender", "exclude", "--clean", "1"], "--clean 1 makes every game a clean one"),
         (spoofer, ["--defender", "nobody"], "duel: defender: unknown response 'nobody'"),
         (defender, ["--payoff", "error"], "--payoff is of a duel: name the --spoofer, too"),
         (defender, ["--spoofer", "ramp:1", "--attacks", "training"], "leave --attacks out"),

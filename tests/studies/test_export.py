@@ -44,6 +44,8 @@ def test_a_run_becomes_an_agent(tmp_path: Path, capsys: pytest.CaptureFixture[st
     (score,) = card.scores
     assert (score.games, score.seed, score.unit) == (20, 3, "m")
     assert score == agent_scores(policy, 20, 3)[0]
+    assert main([str(out), str(tmp_path / "again"), *GAMES]) == 2
+    assert f"{out} is an agent already: name the run folder of its training" in capsys.readouterr().err
     recipe = read_recipe(out)
     assert recipe.program == "spoofgym.learning.spoofer"
     options = {"scenario": FLIGHT, "detector": "snapshot", "knowledge": "blind", "seed": 4, "steps": 1000}
