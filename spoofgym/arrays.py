@@ -12,6 +12,13 @@ Runs = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A view that cannot be written: numba compiles a kernel again for arrays that can."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
 def take_runs(mine: Any, runs: Runs, theirs: Any) -> None:
     """Copy the memory of an object that serves n runs into one of the same class that serves more.
 

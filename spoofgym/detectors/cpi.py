@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Floats, Runs, read_only
 from spoofgym.detectors import cpi_theory
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_P_FA
@@ -58,7 +58,7 @@ def projected(innovation: Innovation, direction: Floats) -> tuple[Floats, Floats
     """
     runs = len(innovation.nis)
     projection, information = np.empty(runs), np.empty(runs)
-    _project(innovation.response, innovation.whitened, direction, projection, information)
+    _project(read_only(innovation.response), innovation.whitened, direction, projection, information)
     return projection, information
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs, read_only
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.chi_square import DEFAULT_P_FA, at_all_degrees, nominal_p_fa, quantile
 from spoofgym.kernels import njit
@@ -124,7 +124,10 @@ def residual_squares(innovation: Innovation) -> tuple[Floats, Runs]:
     covariance, response = innovation.covariance, innovation.response
     # one epoch of a filter with shared gains is the same matrix for all runs
     shared = covariance.strides[0] == 0 and response.strides[0] == 0
-    _square_residuals(covariance, response, innovation.whitened, present, shared, squares, degrees)
+    if shared:
+        covariance, response = covariance[:1], response[:1]
+    matrices = read_only(covariance), read_only(response)
+    _square_residuals(*matrices, innovation.whitened, np.ascontiguousarray(present), shared, squares, degrees)
     return squares, degrees
 
 
@@ -141,7 +144,7 @@ def _square_residuals(
     slots = present.shape[1]
     factor, columns = np.empty((slots, slots)), np.empty((slots, slots))
     basis, rest = np.empty((slots, slots)), np.empty(slots)
-    size = 0
+    size = int(np.int64(0))
     for run in range(len(squares)):
         if run == 0 or not shared:
             inverse_columns(covariance[run], present[run], factor, columns)
@@ -191,7 +194,7 @@ def _nuisance_basis(response: Floats, columns: Floats, basis: Floats) -> int:
         basis: by rows, (S, S), overwritten.
     """
     slots = len(columns)
-    size = 0
+    size = int(np.int64(0))  # numba compiles what it is given to again for a constant
     for c in range(min(UNKNOWNS, slots)):
         for a in range(slots):
             if c < UNKNOWNS - 1:

@@ -14,12 +14,15 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation.packed import pack, packed_size, unpack
 
+PARTS = 9
+"""Arrays of a ring: a filter with fewer adds empty ones, because kernels are compiled for a number of arrays."""
+
 
 class Ring(NamedTuple):
     """The present states of all runs, and their past: epoch k stands at k % slots.
 
     Attributes:
-        states: present arrays that a run is restored to, (N, a), (N, b), ...; integers by their bits.
+        states: present arrays that a run is restored to, (N, a), (N, b), ...; integers by their bits; `PARTS` at least.
         past: their values before the step to each epoch, (N, slots, a), (N, slots, b), ...
         covariance: present P, (N, n, n).
         past_covariance: lower triangles by rows, (N, slots, n (n + 1) / 2).
@@ -72,8 +75,11 @@ class History:
         self._ring = self._flattened()
 
     def _flattened(self) -> Ring:
-        flat = tuple(map(_flat, self._states.values()))
-        return Ring(flat, tuple(self._past.values()), self._covariance, self._past_covariance)
+        num_runs, slots = self._past_covariance.shape[:2]
+        missing = max(PARTS - len(self._states), 0)
+        flat = (*map(_flat, self._states.values()), *[np.zeros((num_runs, 0))] * missing)
+        past = (*self._past.values(), *[np.zeros((num_runs, slots, 0))] * missing)
+        return Ring(flat, past, self._covariance, self._past_covariance)
 
     @property
     def ring(self) -> Ring:

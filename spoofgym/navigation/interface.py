@@ -13,7 +13,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs, read_only
 from spoofgym.navigation.position_domain import project_onto_position, whitened_axes
 from spoofgym.streams import RunStreams
 
@@ -90,7 +90,7 @@ class Innovation:
             return self
         n = len(self.nis)
         residual, covariance, whitened, nis = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3)), np.empty(n)
-        project_onto_position(self.range_response, self.whitened, residual, covariance, whitened, nis)
+        project_onto_position(read_only(self.range_response), self.whitened, residual, covariance, whitened, nis)
         return Innovation(residual, covariance, whitened, nis)
 
 

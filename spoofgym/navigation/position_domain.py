@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spoofgym.arrays import Floats
+from spoofgym.arrays import Floats, read_only
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 
@@ -20,7 +20,7 @@ def whitened_axes(covariance: Floats) -> Floats:
     """L⁻¹ on the first three components, (N, m, 3): the response of a fix of position, for S (N, m, m)."""
     n, m, _ = covariance.shape
     response = np.empty((n, m, 3))
-    _whiten_axes(covariance, response)
+    _whiten_axes(read_only(covariance), response)
     return response
 
 

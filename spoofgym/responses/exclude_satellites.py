@@ -162,7 +162,7 @@ def _judge(ranges: Ranges, fix: Flags, rule: Rule, left_out: Flags, agreed: Runs
                 left_out[run, i], agreed[run, i] = False, 0
             used += present[run, i] and not left_out[run, i]
         while used >= LEAST_TO_JUDGE:
-            size = nuisance_basis(ranges.response[run], factor, columns, left_out[run], -1, basis)
+            size = nuisance_basis(ranges.response[run], factor, columns, left_out[run], slots, basis)
             worst, largest = -1, rule.threshold
             for i in range(slots):
                 if present[run, i] and not left_out[run, i]:
@@ -194,11 +194,11 @@ def nuisance_basis(
         factor: L, (m, m).
         columns: those of L⁻¹, (m, m), by rows.
         left_out: which satellites are, (S,).
-        but: one that is not, whatever ``left_out`` says; -1 = none.
+        but: one that is not, whatever ``left_out`` says; S = none.
         basis: by rows, (m, m), overwritten.
     """
     m, slots = len(columns), len(left_out)
-    size = 0
+    size = int(np.int64(0))  # numba compiles what it is given to again for a constant
     for c in range(UNKNOWNS):
         for block in range(BOTH):
             basis[size] = 0.0

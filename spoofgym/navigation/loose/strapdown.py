@@ -55,7 +55,7 @@ class StrapdownNavigator(InertialBatch):
         self._vehicles = kernels.StrapdownRuns(
             self.index, self._inertial, self.true_bias, instability, self._fix, self._normals
         )
-        by_epoch = FilterNoise(model.measurement_covariance, self.index, np.ones(num_runs))
+        by_epoch = FilterNoise(np.ascontiguousarray(model.measurement_covariance), self.index, np.ones(num_runs))
         self._noise = by_epoch if noise is None else noise
         self.past = History(
             demands.history,

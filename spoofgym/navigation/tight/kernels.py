@@ -189,11 +189,12 @@ def _mechanize(
     samples, bounds, density = motion.samples, motion.bounds, motion.filter_density
     mean_force, residual_bias, navigation, transition, product, half_noise, _ = work
     begin, end = motion.places[k], motion.places[k + 1]
-    start, interval = bounds[begin], 0.0
+    # a variable, because numba compiles `mechanize_part` again for a constant
+    start, nowhere, interval = bounds[begin], bounds[0] - 1, 0.0
     for part in range(begin, end):
         first = bounds[part]
         length = mechanize_part(
-            (first, bounds[part + 1], -1),
+            (first, bounds[part + 1], nowhere),
             residual_bias,
             drawn[NUM_SAMPLE_NOISES * (first - start) :],
             samples,

@@ -134,7 +134,7 @@ class TightDynamics(Immutable):
             clock_noise=self.clock_noise,
             intervals=self.intervals,
             clock_jump=self.clock_jump,
-            started=self.started,
+            started=np.ascontiguousarray(self.started),
             satellite_sigma=self.satellite_sigma,
         )
 
@@ -148,7 +148,7 @@ class TightDynamics(Immutable):
             noise_sigma=self.noise_sigma,
             clock_factor=self.clock_factor,
             intervals=self.intervals,
-            started=self.started,
+            started=np.ascontiguousarray(self.started),
             satellite_sigma=self.satellite_sigma,
         )
 

@@ -64,7 +64,8 @@ class TightStrapdownNavigator(TightOwnCovariances, InertialBatch):
         self.tight = tight
         antenna = geodetic_to_ecef(model.true_position)
         distance = np.sqrt(np.square(satellites - antenna[:, None]).sum(axis=2))
-        self._sky = kernels.Sky(satellites, distance, model.true_velocity)
+        # of one layout in every scenario: kernels are compiled once
+        self._sky = kernels.Sky(*map(np.ascontiguousarray, (satellites, distance, model.true_velocity)))
         self.state = np.zeros((num_runs, n))
         self.range_normals = np.zeros((num_runs, tight.num_epochs + 1, n))
         self._response = np.zeros((num_runs, m, 3))
