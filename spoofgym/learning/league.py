@@ -49,7 +49,8 @@ def parser() -> argparse.ArgumentParser:
     add("--payoff", default="error", metavar="SPEC", help="error, error:CAP or beyond:LIMIT (default: %(default)s)")
     add("--knowledge", choices=KNOWLEDGE, default="shadow", help="of learned spoofers (default: %(default)s)")
     add("--clean", type=share, default=0.5, help="share of games without an attack (default: %(default)s)")
-    add("--rounds", type=count, default=5, help="of best responses (default: %(default)s)")
+    add("--rounds", type=seed_number, default=5,
+        help="of best responses; 0 = compare who is there at the beginning (default: %(default)s)")
     add("--games", type=count, default=500, help="of each cell (default: %(default)s)")
     add("--meta", choices=tuple(META_STRATEGIES), default="nash", help="how a side is mixed (default: %(default)s)")
     add("--spoofer-steps", type=count, default=1_600_000, help="of each spoofer's training (default: %(default)s)")

@@ -2,9 +2,11 @@
 
 import pytest
 
+from spoofgym.envs.vector import DuelDefenderVectorEnv, DuelSpooferVectorEnv
 from spoofgym.policies import published
-from spoofgym.policies.learned import POLICY_FILE
+from spoofgym.policies.learned import POLICY_FILE, SPOOFER, load_policy
 from spoofgym.policies.published import agents_folder, policy_folder, published_folder, published_names
+from spoofgym.policies.recipe import read_recipe
 
 
 @pytest.fixture(params=["agents", "spoofgym/agents"], ids=["checkout", "wheel"])
@@ -47,7 +49,26 @@ def test_a_published_name_is_no_folder_of_the_working_directory(agents, tmp_path
     assert policy_folder("a") == agents / "a"
 
 
-def test_this_version_publishes_no_agents():
-    assert agents_folder().name == "agents"
-    with pytest.raises(ValueError, match="this version publishes no agents"):
+def test_the_agents_of_this_version_can_play() -> None:
+    names = published_names()
+    assert names
+    with pytest.raises(ValueError, match=rf"no published agent is named 'x'; published agents: {', '.join(names)}$"):
         published_folder("x")
+    for name in names:
+        policy = load_policy(published_folder(name))
+        assert policy.name == name
+        config = {"scenario": policy.configuration["scenario"], "detectors": "snapshot"}
+        if policy.kind == SPOOFER:
+            env = DuelDefenderVectorEnv(2, spoofer=f"policy:{name}", **config)
+        else:
+            detectors = tuple(policy.configuration["detectors"])
+            env = DuelSpooferVectorEnv(2, defender=f"policy:{name}", **{**config, "detectors": detectors})
+        env.reset(seed=1)
+        env.step(env.action_space.sample())
+
+
+def test_they_are_small_and_can_be_trained_again() -> None:
+    size = sum(path.stat().st_size for path in agents_folder().rglob("*") if path.is_file())
+    assert size < 3e6
+    for name in published_names():
+        assert read_recipe(published_folder(name)).options["seed"] is not None
