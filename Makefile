@@ -17,8 +17,9 @@ demo: install ## train a PPO spoofer, evaluate it, write tables and a figure to 
 	$(BIN) -m train.spoofer --out $(DEMO)
 	$(BIN) -m spoofgym.studies.evaluate --attacker $(DEMO) --json $(DEMO)/evaluation.json --figure $(DEMO)/evaluation.png
 
+# where bytecode is switched off, each worker and each program that a test starts would compile all sources anew
 test: install-dev ## run the tests; options in ARGS, e.g. make test ARGS="-k geodesy"
-	$(BIN) -m pytest --durations=10 $(ARGS)
+	PYTHONDONTWRITEBYTECODE= $(BIN) -m pytest --durations=10 $(ARGS)
 
 test-portable: install-dev ## run the numerical tests in the arithmetic of an older processor; options in ARGS
 	$(BIN) -m tests.other_kernels $(ARGS)

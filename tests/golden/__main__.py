@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from spoofgym import streams
-from tests.golden import store
+from tests.golden import calibration, store
 from tests.other_kernels import other_kernels
 
 MARGIN = 10.0
@@ -82,6 +82,9 @@ def compare(folder: Path, kinds: Sequence[str]) -> int:
 
 def commit(kinds: Sequence[str]) -> None:
     """Make the arrays of new episodes of some kinds for the repository and measure their tolerances."""
+    if not calibration.FILE.exists():
+        with tempfile.TemporaryDirectory() as cache:
+            calibration.write(Path(cache))
     new = {kind: _make_new(kind) for kind in kinds}
     everyone = {name for episodes in store.KINDS.values() for name in episodes()}
     made = {name for names in new.values() for name in names}
