@@ -29,7 +29,7 @@ def test_golden(kind: str, name: str, monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 
 def test_thresholds_of_few_clean_runs(tmp_path: Path) -> None:
-    """What the default defender needs, in small: windows on white innovations, a slope and a threshold on clean runs."""
+    """What the default defender needs, in small: windows on white innovations, and a slope and a threshold on runs."""
     expected, found = calibration.read()[calibration.FEW], calibration.find(calibration.FEW, tmp_path)
     assert found.keys() == expected.keys()
     for name, setting in found.items():
