@@ -38,6 +38,12 @@ def test_playing_and_evaluating_need_neither_torch_nor_a_terminal() -> None:
     assert result.stdout.strip() == "[]"
 
 
+def test_training_without_its_extra_says_what_to_install() -> None:
+    code = "import sys; sys.modules['stable_baselines3'] = None; import spoofgym.learning"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1].endswith("pip install 'spoofgym[train]'")
+
+
 def test_version_is_that_of_the_project_file() -> None:
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     assert re.search(r'^version = "(.+)"$', text, flags=re.MULTILINE).group(1) == spoofgym.__version__
