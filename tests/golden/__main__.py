@@ -4,9 +4,10 @@
     python -m tests.golden compare runs/golden            # after it: bit for bit
     python -m tests.golden commit                         # new arrays of the repository, and their tolerances
 
-Arrays that are in the repository stay as they are; delete a file to make its arrays anew. `commit` plays every new
-episode again in other arithmetic (code of OpenBLAS, NumPy and numba for older processors) and with all random numbers
-moved by one unit in the last place, and allows each quantity ten times the largest difference.
+Arrays that are in the repository stay as they are; delete a file to make its arrays anew. `commit` adds what is new:
+whole episodes, and what episodes show more of, such as the statistic of a new detector. It plays what is new again in
+other arithmetic (code of OpenBLAS, NumPy and numba for older processors) and with all random numbers moved by one unit
+in the last place, and allows each quantity ten times the largest difference.
 """
 
 from __future__ import annotations
@@ -81,43 +82,56 @@ def compare(folder: Path, kinds: Sequence[str]) -> int:
 
 
 def commit(kinds: Sequence[str]) -> None:
-    """Make the arrays of new episodes of some kinds for the repository and measure their tolerances."""
+    """Make the arrays for the repository of what is new in some kinds and measure their tolerances."""
     if not calibration.FILE.exists():
         with tempfile.TemporaryDirectory() as cache:
             calibration.write(Path(cache))
     new = {kind: _make_new(kind) for kind in kinds}
+    made = {name: keys for news in new.values() for name, keys in news.items()}
     everyone = {name for episodes in store.KINDS.values() for name in episodes()}
-    made = {name for names in new.values() for name in names}
-    allowed = {name: gaps for name, gaps in store.tolerances().items() if name in everyone - made}
-    for label, variables in VARIATIONS.items():
+    allowed = {
+        name: {key: gap for key, gap in gaps.items() if key not in made.get(name, set())}
+        for name, gaps in store.tolerances().items()
+        if name in everyone
+    }
+    for label, variables in VARIATIONS.items() if made else ():
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as cache:
             command = [sys.executable, "-m", "tests.golden", "make", folder, "--kinds", *(k for k in kinds if new[k])]
             # thresholds, too, are calibrated in this arithmetic
             subprocess.run(command, env={**os.environ, **variables, "SPOOFGYM_CACHE": cache}, check=True)
             largest = _widen(allowed, Path(folder), new)
         print(f"{label}: largest difference {largest:.3g}")
-    kept = {name: {key: float(f"{gap:.2g}") for key, gap in gaps.items()} for name, gaps in sorted(allowed.items())}
+    wide = {name: gaps for name, gaps in sorted(allowed.items()) if gaps}
+    kept = {name: {key: float(f"{gap:.2g}") for key, gap in gaps.items()} for name, gaps in wide.items()}
     store.TOLERANCES.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n")
 
 
-def _make_new(kind: str) -> list[str]:
-    """Play the episodes of a kind that the repository does not hold, and forget those that are played no more."""
+def _make_new(kind: str) -> dict[str, set[str]]:
+    """Play what the repository does not hold of the episodes of a kind, and forget what is played no more.
+
+    Returns:
+        Names of the new quantities of every episode that has some.
+    """
     held = store.read(store.FOLDER, kind) if (store.FOLDER / f"{kind}.npz").exists() else {}
-    episodes = store.KINDS[kind]()
-    new = [name for name in episodes if name not in held]
-    if new or held.keys() - episodes.keys():
-        store.write(store.FOLDER, kind, {name: held.get(name) or play() for name, play in episodes.items()})
+    made, new = {}, {}
+    for name, play in store.KINDS[kind]().items():
+        found, old = play(), held.get(name, {})
+        made[name] = {key: old.get(key, array) for key, array in found.items()}
+        if found.keys() - old.keys():
+            new[name] = set(found.keys() - old.keys())
+    if {name: arrays.keys() for name, arrays in made.items()} != {name: arrays.keys() for name, arrays in held.items()}:
+        store.write(store.FOLDER, kind, made)
     return new
 
 
-def _widen(allowed: dict[str, dict[str, float]], folder: Path, new: dict[str, list[str]]) -> float:
-    """Allow what a variation made of the episodes; the largest difference of all."""
+def _widen(allowed: dict[str, dict[str, float]], folder: Path, new: dict[str, dict[str, set[str]]]) -> float:
+    """Allow what a variation made of the new quantities; the largest difference of all."""
     largest = 0.0
     for kind in (kind for kind, names in new.items() if names):
         varied, held = store.read(folder, kind), store.read(store.FOLDER, kind)
-        for name in new[kind]:
-            for key, array in held[name].items():
-                gap = store.distance(array, varied[name][key])
+        for name, keys in new[kind].items():
+            for key in sorted(keys):
+                gap = store.distance(held[name][key], varied[name][key])
                 largest = max(largest, gap)
                 if not np.isfinite(gap):
                     raise SystemExit(f"{name}: {key}: a variation changes what must be equal: choose another episode")

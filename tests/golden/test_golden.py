@@ -4,10 +4,12 @@ import dataclasses
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from spoofgym.calibration import thresholds
 from tests.golden import calibration, store
+from tests.golden.__main__ import _make_new
 
 CALIBRATED = ("game defender default", "game alone Defender-v0")
 """Episodes of the default detectors of a defender, whose thresholds are golden, too."""
@@ -39,3 +41,15 @@ def test_thresholds_of_few_clean_runs(tmp_path: Path) -> None:
 def test_every_episode_has_golden_arrays_and_none_are_left_over() -> None:
     for kind, episodes in store.KINDS.items():
         assert set(store.names(store.FOLDER, kind)) == episodes().keys()
+
+
+def test_new_quantities_are_added_and_the_others_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "FOLDER", tmp_path)
+    store.write(tmp_path, "toys", {"one": {"error": np.zeros(2), "gone": np.ones(1)}, "old": {"error": np.zeros(1)}})
+    games = {"one": {"error": np.ones(2), "statistic": np.full(3, 2.0)}, "two": {"error": np.full(1, 3.0)}}
+    monkeypatch.setattr(store, "KINDS", {"toys": lambda: {name: (lambda n=name: games[n]) for name in games}})
+    assert _make_new("toys") == {"one": {"statistic"}, "two": {"error"}}
+    held = store.read(tmp_path, "toys")
+    assert {name: sorted(arrays) for name, arrays in held.items()} == {"one": ["error", "statistic"], "two": ["error"]}
+    assert held["one"]["error"].tolist() == [0.0, 0.0]  # not what it is now: the test of golden episodes tells
+    assert _make_new("toys") == {}
