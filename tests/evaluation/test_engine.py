@@ -1,8 +1,6 @@
 """Engines give the same results wherever they compute; dead workers are replaced and failures named."""
 
-import os
 import re
-import signal
 from pathlib import Path
 
 import pytest
@@ -11,31 +9,7 @@ from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.cell_store import CellStore
 from spoofgym.evaluation.duels import harms
 from spoofgym.evaluation.engine import Engine, Here, Processes, Ray, Task, make_engine
-
-
-def square(number: int) -> int:
-    return number * number
-
-
-def refuse(number: int) -> int:
-    raise ValueError(f"{number} is refused")
-
-
-def keep(path: str) -> str:
-    Path(path).touch()
-    return path
-
-
-def die_once(path: str) -> int:
-    """The worker dies at the first call and lives at the second."""
-    if not Path(path).exists():
-        Path(path).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return 7
-
-
-def die() -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
+from tests.evaluation.tasks import die, die_once, keep, refuse, square
 
 
 @pytest.fixture(params=["here", "processes", "ray"])
