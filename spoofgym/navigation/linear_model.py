@@ -276,13 +276,15 @@ def _accumulate(
     force, middle = np.empty(3), np.empty((3, 3))
     for epoch in range(transition.shape[0]):
         total = transition[epoch]
-        total[:, :] = np.eye(NUM_INERTIAL)
+        total[:, :] = 0.0
+        for a in range(NUM_INERTIAL):
+            total[a, a] = 1.0
         noise[:, epoch, :, :] = 0.0
         for i in range(epoch * samples, (epoch + 1) * samples):
-            middle[:, :] = 0.5 * (motion.attitude[i] + motion.attitude[i + 1])
             for a in range(3):
                 force[a] = 0.0
                 for b in range(3):
+                    middle[a, b] = 0.5 * (motion.attitude[i, a, b] + motion.attitude[i + 1, a, b])
                     force[a] += middle[a, b] * motion.specific_force[i, b]
             navigation_dynamics(motion.velocity[i], motion.position[i], force, dynamics)
             transition_matrix(dynamics, middle, step, one, work)
@@ -294,6 +296,8 @@ def _accumulate(
                         product[a, b] += one[a, c] * total[c, b]
                 for c in range(NUM_NAVIGATION, NUM_INERTIAL):  # biases stay what they are
                     product[a, c] += one[a, c]
-            total[:NUM_NAVIGATION, :] = product
+            for a in range(NUM_NAVIGATION):
+                for b in range(NUM_INERTIAL):
+                    total[a, b] = product[a, b]
             for d in range(len(densities)):
                 kalman.predict_covariance(one, densities[d], noise[d, epoch], product)

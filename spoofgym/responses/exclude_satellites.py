@@ -224,7 +224,8 @@ def _add_columns(basis: Floats, size: int, columns: Floats, satellite: int) -> i
     m = len(columns)
     for block in range(BOTH):
         if size < m:
-            basis[size] = columns[block * (m // BOTH) + satellite]
+            for a in range(m):
+                basis[size, a] = columns[block * (m // BOTH) + satellite, a]
             size = orthonormal(basis, size)
     return size
 

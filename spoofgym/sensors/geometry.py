@@ -220,7 +220,8 @@ def invert_normal(line_of_sight: Floats, weight: Floats, inverse: Floats) -> Non
         if weight[s] == 0.0:
             continue
         number += 1
-        row[:3] = -line_of_sight[s]
+        for i in range(3):
+            row[i] = -line_of_sight[s, i]
         for i in range(4):
             for j in range(i + 1):
                 normal[i, j] += weight[s] * row[i] * row[j]

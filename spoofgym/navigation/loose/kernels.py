@@ -197,9 +197,11 @@ def mechanize_part(
     interval = 0.0
     for i in range(start, stop):
         if i == middle:
-            middle_attitude[:, :] = attitude
-            middle_velocity[:] = velocity
-            middle_position[:] = position
+            # element by element: a kernel that assigns an array to a part of another takes seconds more to compile
+            for a in range(3):
+                middle_velocity[a], middle_position[a] = velocity[a], position[a]
+                for b in range(3):
+                    middle_attitude[a, b] = attitude[a, b]
         if i == taken:
             _keep_fix(solution, fix)
         for a in range(3):

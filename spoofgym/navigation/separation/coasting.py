@@ -147,7 +147,8 @@ def _separation_variance(
     for k in range(rows):
         for a in range(axes):
             total = 0.0
-            direction[:] = projected[k, a]
+            for i in range(NUM_INERTIAL):
+                direction[i] = projected[k, a, i]
             for age in range(min(windows, k + 1)):
                 for c in range(response.shape[2]):
                     part = 0.0
@@ -161,7 +162,8 @@ def _separation_variance(
                     for i in range(NUM_INERTIAL):
                         for j in range(NUM_INERTIAL):
                             before[j] += moved[(k - age) // origin_rows, i, j] * direction[i]
-                    direction[:] = before
+                    for i in range(NUM_INERTIAL):
+                        direction[i] = before[i]
 
 
 def _early(response: Floats, num_windows: int) -> Floats:
