@@ -50,7 +50,17 @@ def covariance_recursion(steps: FilterSteps, ranges: Ranges, covariance: Floats,
         kalman.cholesky(innovation, factor)
         tight_filter.whitened_gain(cross, factor, gain)
         if keep:
-            kept.covariance[k], kept.innovation_covariance[k] = covariance, innovation
-            kept.innovation_factor[k], kept.whitened_gain[k] = factor, gain
+            _copy(covariance, kept.covariance[k])
+            _copy(innovation, kept.innovation_covariance[k])
+            _copy(factor, kept.innovation_factor[k])
+            _copy(gain, kept.whitened_gain[k])
             tight_filter.position_response(ranges.columns, ranges.values[k], factor, kept.position_response[k])
         tight_filter.update_covariance(gain, covariance)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _copy(matrix: Floats, to: Floats) -> None:
+    """Element by element: a kernel that assigns an array to a part of another takes seconds more to compile."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            to[i, j] = matrix[i, j]
