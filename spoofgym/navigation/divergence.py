@@ -111,7 +111,11 @@ def hold(
         if not diverged[run]:
             diverged[run] = not valid(own, covariance[run])
         if diverged[run]:
-            covariance[run], auxiliary[run] = prior_covariance, 0.0
+            auxiliary[run] = 0.0
+            # element by element: a kernel that assigns an array to a part of another takes seconds more to compile
+            for i in range(covariance.shape[1]):
+                for j in range(covariance.shape[2]):
+                    covariance[run, i, j] = prior_covariance[i, j]
             for i in range(9):
                 own.attitude[i // 3, i % 3] = kept[i]
             for i in range(3):
