@@ -24,12 +24,14 @@ class Ring(NamedTuple):
     Attributes:
         states: present arrays that a run is restored to, (N, a), (N, b), ...; integers by their bits; `PARTS` at least.
         past: their values before the step to each epoch, (N, slots, a), (N, slots, b), ...
+        parts: how many of these arrays the filter has; the others are empty.
         covariance: present P, (N, n, n).
         past_covariance: lower triangles by rows, (N, slots, n (n + 1) / 2).
     """
 
     states: tuple[Floats, ...]
     past: tuple[Floats, ...]
+    parts: int
     covariance: Floats
     past_covariance: Floats
 
@@ -79,7 +81,7 @@ class History:
         missing = max(PARTS - len(self._states), 0)
         flat = (*map(_flat, self._states.values()), *[np.zeros((num_runs, 0))] * missing)
         past = (*self._past.values(), *[np.zeros((num_runs, slots, 0))] * missing)
-        return Ring(flat, past, self._covariance, self._past_covariance)
+        return Ring(flat, past, len(self._states), self._covariance, self._past_covariance)
 
     @property
     def ring(self) -> Ring:
@@ -107,7 +109,7 @@ def keep(run: int, epoch: int, ring: Ring) -> None:
     if slots == 0:
         return
     slot = epoch % slots
-    for part in range(len(ring.states)):
+    for part in range(ring.parts):
         state, past = ring.states[part], ring.past[part]
         for i in range(state.shape[1]):
             past[run, slot, i] = state[run, i]
@@ -124,7 +126,7 @@ def restore(runs: Runs, epochs: Runs, index: Runs, ring: Ring) -> None:
     for run in runs:
         index[run] -= epochs[run]
         slot = (index[run] + 1) % slots
-        for part in range(len(ring.states)):
+        for part in range(ring.parts):
             state, past = ring.states[part], ring.past[part]
             for i in range(state.shape[1]):
                 state[run, i] = past[run, slot, i]
