@@ -98,8 +98,8 @@ def classical_defenders(scenario: Scenario) -> tuple[str, ...]:
     return (*dict.fromkeys(spelled), *YARDSTICKS)
 
 
-def settings_of(options: argparse.Namespace) -> LeagueSettings:
-    """The league that the options ask for.
+def duel_of(options: argparse.Namespace) -> tuple[DuelConfig, tuple[str, ...]]:
+    """The duel that the options ask for, with the detectors of all defenders, and these defenders.
 
     Raises:
         ValueError: a part that is unknown or does not fit.
@@ -114,8 +114,18 @@ def settings_of(options: argparse.Namespace) -> LeagueSettings:
         clean=options.clean,
         threads=options.threads,
     )
+    return with_detectors_of(duel, defenders), defenders
+
+
+def settings_of(options: argparse.Namespace) -> LeagueSettings:
+    """The league that the options ask for.
+
+    Raises:
+        ValueError: a part that is unknown or does not fit.
+    """
+    duel, defenders = duel_of(options)
     return LeagueSettings(
-        duel=with_detectors_of(duel, defenders),
+        duel=duel,
         spoofers=tuple(options.spoofer or SPOOFERS),
         defenders=defenders,
         rounds=options.rounds,
