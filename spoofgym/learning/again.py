@@ -15,7 +15,7 @@ from pathlib import Path
 
 from spoofgym.command_line import Parser, run_folder, threads
 from spoofgym.policies.published import policy_folder
-from spoofgym.policies.recipe import read_recipe
+from spoofgym.policies.recipe import RECIPE_FILE, read_recipe
 from spoofgym.program import program
 
 
@@ -34,11 +34,17 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    recipe = read_recipe(policy_folder(options.agent))
+    folder = policy_folder(options.agent)
+    recipe = read_recipe(folder)
     given = [*recipe.arguments, "--out", str(options.out), "--threads", str(options.threads)]
     if options.resume:
         given.append("--resume")
-    return int(importlib.import_module(recipe.program).main(given))
+    learner = importlib.import_module(recipe.program)
+    known = {action.dest for action in learner.parser()._actions}
+    unknown = sorted(set(recipe.options) - known)
+    if unknown:
+        raise ValueError(f"{folder / RECIPE_FILE}: {recipe.program} has no option {', '.join(unknown)}")
+    return int(learner.main(given))
 
 
 if __name__ == "__main__":

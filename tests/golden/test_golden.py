@@ -53,3 +53,8 @@ def test_new_quantities_are_added_and_the_others_stay(tmp_path: Path, monkeypatc
     assert {name: sorted(arrays) for name, arrays in held.items()} == {"one": ["error", "statistic"], "two": ["error"]}
     assert held["one"]["error"].tolist() == [0.0, 0.0]  # not what it is now: the test of golden episodes tells
     assert _make_new("toys") == {}
+
+
+def test_the_arrays_are_small() -> None:
+    """Together under 2 MB: shorten an episode, or thin its quantities, before another is added beyond that."""
+    assert sum(path.stat().st_size for path in store.FOLDER.iterdir()) < 2e6

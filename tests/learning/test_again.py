@@ -9,6 +9,7 @@ pytest.importorskip("torch")
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
 from spoofgym.learning import again, defender, defender_ppo, ppo, spoofer
 from spoofgym.learning.run_folder import Run
+from spoofgym.policies.recipe import Recipe
 from spoofgym.studies.export import recipe_of
 
 
@@ -49,3 +50,9 @@ def test_the_options_of_a_recipe_are_the_run(module, run, tmp_path: Path, monkey
 def test_an_agent_without_a_recipe_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert again.main([str(tmp_path)]) == 2
     assert "has no recipe.toml: it cannot be trained again" in capsys.readouterr().err
+
+
+def test_a_recipe_with_an_unknown_option_names_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Recipe("spoofgym.learning.spoofer", {"sed": 0}).write(tmp_path)
+    assert again.main([str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert f"{tmp_path / 'recipe.toml'}: spoofgym.learning.spoofer has no option sed" in capsys.readouterr().err
