@@ -63,8 +63,9 @@ class DuelSpooferEnv(_SideEnv):
     |---|---|---|
     | `defender` | `"exclude"` | who defends: a response, `DETECTOR > RESPONSE`, `policy:FOLDER`, or a pool |
 
-    `defender` is spelled as `response` of Spoofer-v0. Use `clean=0` to train on attacked games alone: in clean games
-    nothing that the agent does has an effect.
+    `defender` is spelled as `response` of Spoofer-v0. The detector that a defender follows (`snapshot` of `snapshot >
+    exclude`), and those that a policy sees, must be among `detectors`. Use `clean=0` to train on attacked games alone:
+    in clean games nothing that the agent does has an effect.
 
     ## Version History
 

@@ -85,18 +85,28 @@ def _table(title: str, columns: tuple[str, ...]) -> Table:
 
 
 def league_figure(report: dict[str, Any], path: Path) -> None:
-    """The payoff matrix of the last round, its mixtures at the margins, and the value per round.
+    """The payoff matrix of the last round, its mixtures at the margins, and the value per round if there are several.
 
     Args:
         report: of `spoofgym.learning.league`.
         path: of the picture.
     """
+    results = report["results"]
+    rows, columns = np.array(results[-1]["mean"]).shape
+    several = len(results) > 1
+    figure = new_figure(4.5 + 0.62 * columns, (4.2 if several else 2.6) + 0.34 * rows, dpi=110, layout="constrained")
+    if several:
+        upper, lower = figure.subplots(2, 1, gridspec_kw={"height_ratios": (rows + 2, 7)})
+        _draw_values(lower, results, _unit(report))
+    else:
+        upper = figure.subplots()
+    _draw_matrix(upper, report)
+    files.write_figure(path, figure)
+
+
+def _draw_matrix(axes: Any, report: dict[str, Any]) -> None:
     last = report["results"][-1]
     mean = np.array(last["mean"])
-    rows, columns = mean.shape
-    figure = new_figure(4.5 + 0.62 * columns, 4.2 + 0.34 * rows, dpi=110, layout="constrained")
-    grid = figure.add_gridspec(2, 1, height_ratios=(rows + 2, 7))
-    axes, lower = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
     axes.imshow(mean, cmap="YlOrRd", aspect="auto", vmin=0.0)
     middle = 0.6 * float(mean.max())
     for (row, column), value in np.ndenumerate(mean):
@@ -105,18 +115,22 @@ def league_figure(report: dict[str, Any], path: Path) -> None:
         axes.text(column, row, text, ha="center", va="center", fontsize=6.5, color=colour)
     named = [(last["defenders"], last["defender_mixture"]), (last["spoofers"], last["spoofer_mixture"])]
     labels = [[_label(name, share) for name, share in zip(*pair, strict=True)] for pair in named]
-    axes.set_xticks(range(columns), labels[0], rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.set_yticks(range(rows), labels[1], fontsize=8)
-    unit = _unit(report)
-    axes.set_title(f"{report['duel']['scenario']}: mean harm{unit}, and who is mixed", loc="left", fontsize=11)
-    numbers = [found["number"] for found in report["results"]]
-    low, high = np.array([found["value_ci95"] for found in report["results"]]).T
-    lower.fill_between(numbers, low, high, color="#0072b2", alpha=0.2, linewidth=0)
-    lower.plot(numbers, [found["value"] for found in report["results"]], color="#0072b2", marker="o")
-    lower.set_xticks(numbers)
-    lower.set(xlabel="round", ylabel=f"value{unit}", ylim=(0, None))
-    lower.grid(color="#e6e6e6", linewidth=0.6)
-    files.write_figure(path, figure)
+    axes.set_xticks(range(mean.shape[1]), labels[0], rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_yticks(range(mean.shape[0]), labels[1], fontsize=8)
+    low, high = last["value_ci95"]
+    value = f"value {last['value']:.3g} [{low:.3g}, {high:.3g}]"
+    title = f"{report['duel']['scenario']}: mean harm{_unit(report)}, share in the mixture in brackets; {value}"
+    axes.set_title(title, loc="left", fontsize=11)
+
+
+def _draw_values(axes: Any, results: list[dict[str, Any]], unit: str) -> None:
+    numbers = [found["number"] for found in results]
+    low, high = np.array([found["value_ci95"] for found in results]).T
+    axes.fill_between(numbers, low, high, color="#0072b2", alpha=0.2, linewidth=0)
+    axes.plot(numbers, [found["value"] for found in results], color="#0072b2", marker="o")
+    axes.set_xticks(numbers)
+    axes.set(xlabel="round", ylabel=f"value{unit}", ylim=(0, 1.1 * max(high)))
+    axes.grid(color="#e6e6e6", linewidth=0.6)
 
 
 def _label(name: str, share: float) -> str:
