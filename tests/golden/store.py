@@ -22,6 +22,9 @@ KINDS: dict[str, Callable[[], dict[str, Callable[[], Arrays]]]] = {
 ALL_KINDS = {**KINDS, "logs": results.real_logs}
 """With games on recorded logs, which are not in the repository."""
 SEPARATOR = " | "
+ROUNDING = 1e-11
+"""Share of a quantity's largest value by which every machine may differ: the tolerances are measured on one, in a few
+other arithmetics, and another processor rounds in its own way."""
 
 
 def write(folder: Path, kind: str, made: dict[str, Arrays]) -> None:
@@ -53,7 +56,13 @@ def tolerances() -> dict[str, dict[str, float]]:
 
 
 def differences(expected: Arrays, found: Arrays, allowed: dict[str, float] | None = None) -> list[str]:
-    """What differs in an episode, in words; ``allowed`` is the tolerance of a quantity, 0 where it is missing."""
+    """What differs in an episode, in words.
+
+    Args:
+        expected: the golden arrays.
+        found: what was played.
+        allowed: tolerances of quantities, on another machine; None = on the same machine, where all bits are equal.
+    """
     told = [f"{name}: missing" for name in expected.keys() - found.keys()]
     told += [f"{name}: new" for name in found.keys() - expected.keys()]
     for name in sorted(expected.keys() & found.keys()):
@@ -62,10 +71,17 @@ def differences(expected: Arrays, found: Arrays, allowed: dict[str, float] | Non
             told.append(f"{name}: {one.dtype}{one.shape} became {two.dtype}{two.shape}")
             continue
         gap = distance(one, two)
-        if not gap <= (allowed or {}).get(name, 0.0):
+        if not gap <= (0.0 if allowed is None else max(allowed.get(name, 0.0), ROUNDING * largest(one))):
             where = np.argwhere(one != two)
             told.append(f"{name}: differs by up to {gap:.3g}, first at {tuple(where[0].tolist())} of {one.shape}")
     return told
+
+
+def largest(values: np.ndarray) -> float:
+    """The largest magnitude of an array of floating-point numbers; 0 for others, and where none is finite."""
+    if values.dtype.kind != "f":
+        return 0.0
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 def distance(one: np.ndarray, two: np.ndarray) -> float:

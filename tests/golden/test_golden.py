@@ -55,6 +55,15 @@ def test_new_quantities_are_added_and_the_others_stay(tmp_path: Path, monkeypatc
     assert _make_new("toys") == {}
 
 
+def test_other_machines_may_round_and_nothing_more() -> None:
+    expected = {"bias": np.array([1e-3, -2e-3]), "chosen": np.array([3])}
+    rounded = {"bias": expected["bias"] * (1.0 + 5e-12), "chosen": np.array([3])}
+    assert store.differences(expected, rounded, {}) == []
+    assert len(store.differences(expected, rounded)) == 1  # on one machine all bits are equal
+    assert len(store.differences(expected, {**rounded, "bias": expected["bias"] * (1.0 + 5e-11)}, {})) == 1
+    assert len(store.differences(expected, {**rounded, "chosen": np.array([4])}, {})) == 1
+
+
 def test_the_arrays_are_small() -> None:
     """Together under 2 MB: shorten an episode, or thin its quantities, before another is added beyond that."""
     assert sum(path.stat().st_size for path in store.FOLDER.iterdir()) < 2e6
