@@ -1,11 +1,14 @@
-"""Cells of a payoff matrix on disk: each is played once, whoever asks for it and however often a program is killed."""
+"""Cells of a payoff matrix on disk: each game is played once, whoever asks for it and however often it is killed.
+
+Game i of a cell is the same however many there are, so a cell is asked for its first games, and may grow.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,7 +19,7 @@ from spoofgym import files
 from spoofgym.archive import read_arrays
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.duels import Cell, play_cell
-from spoofgym.evaluation.engine import Engine, Task
+from spoofgym.evaluation.engine import Engine, Notify, Task
 from spoofgym.policies.learned import load_policy
 from spoofgym.policies.published import POLICY, policy_folder
 
@@ -30,42 +33,64 @@ class CellStore:
         Args:
             folder: is made where there is none.
             config: arguments of the duel, with the detectors of all players.
-            games: of each cell.
+            games: that each cell has at least.
             seed: of game 0 of each cell.
         """
         self._folder, self._config, self._games, self._seed = folder, config, games, seed
 
-    def cell(self, spoofer: str, defender: str) -> Cell:
-        """The games of a spoofer against a defender, from the folder or played now.
+    @property
+    def games(self) -> int:
+        """That each cell has at least."""
+        return self._games
+
+    def cell(self, spoofer: str, defender: str, games: int | None = None) -> Cell:
+        """The first games of a spoofer against a defender, from the folder, or played now where they are not there.
 
         Args:
             spoofer: its specification.
             defender: its specification.
+            games: how many, at least those that each cell has; None = those.
 
         Raises:
             ValueError: a player that is unknown or does not fit, or a damaged file.
         """
-        path = self._folder / f"{self._key(spoofer, defender)}.npz"
-        if path.exists():
-            return _read(path, spoofer, defender, self._games)
-        played = play_cell(self._config, spoofer, defender, self._games, self._seed)
-        packed = io.BytesIO()
-        np.savez(packed, harm=played.harm, clean=played.clean)
-        files.write_bytes(path, packed.getvalue())
-        return played
+        games = self._games if games is None else games
+        path = self._path(spoofer, defender)
+        kept = self._read(path, spoofer, defender)
+        there = 0 if kept is None else len(kept.harm)
+        if kept is None or there < games:
+            played = play_cell(self._config, spoofer, defender, games - there, self._seed + there)
+            kept = played if kept is None else kept.followed_by(played)
+            packed = io.BytesIO()
+            np.savez(packed, harm=kept.harm, clean=kept.clean)
+            files.write_bytes(path, packed.getvalue())
+        return kept.first(games)
 
-    def holds(self, spoofer: str, defender: str) -> bool:
-        """Whether the games of a cell have been played.
+    def fill(self, wanted: Mapping[tuple[str, str], int], engine: Engine, notify: Notify) -> None:
+        """Play what is lacking of some cells.
+
+        Args:
+            wanted: how many games each cell, a spoofer and a defender, is to have.
+            engine: plays them.
+            notify: told each cell that is played.
 
         Raises:
-            ValueError: a policy that cannot be read.
+            ValueError: as `cell`.
+            RuntimeError: a failure of the engine.
         """
-        return (self._folder / f"{self._key(spoofer, defender)}.npz").exists()
+        tasks = []
+        for (spoofer, defender), games in wanted.items():
+            kept = self._read(self._path(spoofer, defender), spoofer, defender)
+            there = 0 if kept is None else len(kept.harm)
+            if there < games:
+                which = f", games {there} to {games - 1}" if there else ""
+                tasks.append(Task(f"{spoofer} against {defender}{which}", _keep, (self, spoofer, defender, games)))
+        engine.run(tasks, notify)
 
     def matrix(
-        self, spoofers: Sequence[str], defenders: Sequence[str], engine: Engine, notify: Callable[[str], None]
+        self, spoofers: Sequence[str], defenders: Sequence[str], engine: Engine, notify: Notify
     ) -> list[list[Cell]]:
-        """The cells of every spoofer (a row each) against every defender (a column each).
+        """The cells of every spoofer (a row each) against every defender (a column each), as many games in each.
 
         Args:
             spoofers: specifications.
@@ -77,9 +102,27 @@ class CellStore:
             ValueError: as `cell`.
             RuntimeError: a failure of the engine.
         """
-        missing = [(one, two) for one in spoofers for two in defenders if not self.holds(one, two)]
-        engine.run([Task(f"{one} against {two}", _keep, (self, one, two)) for one, two in missing], notify)
+        self.fill({(one, two): self._games for one in spoofers for two in defenders}, engine, notify)
         return [[self.cell(one, two) for two in defenders] for one in spoofers]
+
+    def _path(self, spoofer: str, defender: str) -> Path:
+        return self._folder / f"{self._key(spoofer, defender)}.npz"
+
+    def _read(self, path: Path, spoofer: str, defender: str) -> Cell | None:
+        """All games of a file; None where there is none.
+
+        Raises:
+            ValueError: it is damaged.
+        """
+        if not path.exists():
+            return None
+        arrays = read_arrays(path)
+        with files.reading(path):
+            harm, clean = arrays["harm"], arrays["clean"]
+            right = harm.ndim == 1 and harm.shape == clean.shape and len(harm) >= self._games
+            if not right or clean.dtype != np.bool_ or not np.isfinite(harm).all():
+                raise ValueError(f"it does not hold the harm of {self._games} games")
+            return Cell(spoofer, defender, harm.astype(np.float64), clean)
 
     def _key(self, spoofer: str, defender: str) -> str:
         """Digest of all that decides the games."""
@@ -88,9 +131,9 @@ class CellStore:
         return hashlib.sha256(json.dumps(content, default=str, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def _keep(store: CellStore, spoofer: str, defender: str) -> None:
-    """Play a cell that stays on disk; nothing of it has to travel between processes."""
-    store.cell(spoofer, defender)
+def _keep(store: CellStore, spoofer: str, defender: str, games: int) -> None:
+    """Play games that stay on disk; nothing of them has to travel between processes."""
+    store.cell(spoofer, defender, games)
 
 
 def _identity(player: str) -> Any:
@@ -102,12 +145,3 @@ def _identity(player: str) -> Any:
         return player
     policy = load_policy(policy_folder(player))
     return [policy.weights_digest, dict(policy.configuration)]
-
-
-def _read(path: Path, spoofer: str, defender: str, games: int) -> Cell:
-    arrays = read_arrays(path)
-    with files.reading(path):
-        harm, clean = arrays["harm"], arrays["clean"]
-        if harm.shape != (games,) or clean.shape != (games,) or clean.dtype != np.bool_ or not np.isfinite(harm).all():
-            raise ValueError(f"it does not hold the harm of {games} games")
-        return Cell(spoofer, defender, harm.astype(np.float64), clean)

@@ -51,6 +51,15 @@ class Cell:
         """95 % interval of the mean."""
         return mean_interval(self.harm)
 
+    def first(self, games: int) -> Cell:
+        """The first games alone."""
+        return replace(self, harm=self.harm[:games], clean=self.clean[:games])
+
+    def followed_by(self, later: Cell) -> Cell:
+        """These games and those that come after them."""
+        harm, clean = np.concatenate([self.harm, later.harm]), np.concatenate([self.clean, later.clean])
+        return replace(self, harm=harm, clean=clean)
+
 
 def play_cell(config: DuelConfig, spoofer: Any, defender: Any, games: int, seed: int) -> Cell:
     """Play whole duels of one spoofer against one defender.
@@ -136,5 +145,10 @@ def play_matrix(
 
 
 def harms(cells: Sequence[Sequence[Cell]]) -> Floats:
-    """The harm of every game of a matrix, (S, D, G)."""
-    return np.array([[cell.harm for cell in row] for row in cells])
+    """The harm of every game of a matrix, (S, D, G); NaN after the games of a cell that has fewer than others."""
+    most = max(len(cell.harm) for row in cells for cell in row)
+    result = np.full((len(cells), len(cells[0]), most), np.nan)
+    for row, column in np.ndindex(result.shape[:2]):
+        harm = cells[row][column].harm
+        result[row, column, : len(harm)] = harm
+    return result

@@ -167,21 +167,23 @@ def value_interval(harms: Floats, seed: int = 0, resamples: int = RESAMPLES) -> 
     Game i of every cell has the same random numbers, so games are drawn for all cells together.
 
     Args:
-        harms: of every game, (S, D, G).
+        harms: of every game, (S, D, G); NaN after the games of a cell that has fewer than others.
         seed: of the resampling.
         resamples: how often.
 
     Raises:
-        ValueError: fewer than two games, or as `check_matrix`.
+        ValueError: a cell of fewer than two games, or as `check_matrix`.
     """
     games = np.asarray(harms, dtype=np.float64)
-    if games.ndim != 3 or games.shape[2] < 2:
+    there = ~np.isnan(games)
+    if games.ndim != 3 or not (there.sum(axis=-1) >= 2).all():
         raise ValueError(f"{OWNER}: an interval needs harms (S, D, G) of two games or more, got shape {games.shape}")
     rng = np.random.default_rng(seed)
     count = games.shape[2]
+    played, present = np.where(there, games, 0.0), there.astype(np.float64)
     values = []
     for _ in range(validation.whole(OWNER, "resamples", resamples, 1)):
-        drawn = rng.multinomial(count, np.full(count, 1.0 / count)) / count
-        values.append(nash(games @ drawn).value)
+        drawn = rng.multinomial(count, np.full(count, 1.0 / count)).astype(np.float64)
+        values.append(nash((played @ drawn) / (present @ drawn)).value)
     low, high = np.percentile(values, (2.5, 97.5))
     return float(low), float(high)

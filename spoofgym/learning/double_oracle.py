@@ -1,8 +1,8 @@
 """Double oracle: a payoff matrix grows by best responses to the other side's mixture, until none gains (PSRO).
 
-Each round fills the matrix, solves it, trains a best response of each side to the other's mixture, and takes it in if
-it gains more than the interval of the gain. Everything is on disk: cells, policies, rounds. A league that is killed
-goes on where it stood and ends with the same numbers.
+Each round fills the matrix, with more games where an interval decides who is mixed in, solves it, trains a best
+response of each side to the other's mixture, and takes it in if it gains more than the interval of the gain. Everything
+is on disk: cells, policies, rounds. A league that is killed goes on where it stood and ends with the same numbers.
 
 McMahan, Gordon and Blum 2003 (double oracle); Lanctot et al. 2017 (policy-space response oracles).
 """
@@ -11,17 +11,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spoofgym import files, validation
 from spoofgym.arrays import Floats
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DEFENDER, SPOOFER
+from spoofgym.evaluation.allotment import Allotment, paired
 from spoofgym.evaluation.cell_store import CellStore
+from spoofgym.evaluation.contests import CONTESTS, ROUNDING, Contest
+from spoofgym.evaluation.duels import harms
 from spoofgym.evaluation.engine import Engine, Here, Notify, Task
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.evaluation.payoff import (
@@ -40,8 +44,8 @@ OWNER = "league"
 SETTINGS_FILE, ROUNDS_FILE = "league.json", "rounds.json"
 LEAST_WEIGHT = 1e-3
 """A player that is mixed in more rarely is no opponent of a training."""
-ROUNDING = 1e-9
-"""A gain below this share of the largest payoff is none: sums in another order."""
+MORE_GAMES = 4
+"""By default a cell that an interval needs gets so many times the games of the others."""
 SCHEMA_VERSION = 1
 
 
@@ -54,7 +58,8 @@ class LeagueSettings:
         spoofers: specifications of the spoofers that it begins with.
         defenders: specifications of the defenders that it begins with.
         rounds: of best responses.
-        games: of each cell.
+        games: that each cell begins with.
+        most_games: of a cell whose interval decides who is mixed in; None = `MORE_GAMES` times ``games``.
         meta: how both sides are mixed: "nash", "uniform" or "stackelberg".
         seed: of game 0 of each cell; trainings have seeds of their own from it.
         resamples: of the games, for the interval of the value.
@@ -68,6 +73,7 @@ class LeagueSettings:
     defenders: tuple[str, ...]
     rounds: int = 5
     games: int = 500
+    most_games: int | None = None
     meta: str = "nash"
     seed: int = 0
     resamples: int = RESAMPLES
@@ -76,7 +82,10 @@ class LeagueSettings:
         if not self.spoofers or not self.defenders:
             raise ValueError("a league begins with at least one spoofer and one defender")
         validation.whole(OWNER, "rounds", self.rounds, 0, 1000)
-        validation.whole(OWNER, "games", self.games, 2, 10**7)
+        games = validation.whole(OWNER, "games", self.games, 2, 10**7)
+        if self.most_games is None:
+            object.__setattr__(self, "most_games", MORE_GAMES * games)
+        validation.whole(OWNER, "most_games", self.most_games, games, MORE_GAMES * 10**7)
         validation.one_of(OWNER, "meta", self.meta, tuple(META_STRATEGIES))
         validation.seed(OWNER, self.seed)
         validation.whole(OWNER, "resamples", self.resamples, 1, 10**6)
@@ -111,6 +120,7 @@ class Round:
         defenders: its columns.
         mean: mean harm of each cell, (S, D).
         half_width: of its 95 % interval, (S, D).
+        games: of each cell, (S, D).
         mixtures: of both sides, and the value.
         value_interval: 95 % bootstrap interval of the value of the game.
         nash_conv: of the mixtures, within the matrix.
@@ -124,6 +134,7 @@ class Round:
     defenders: tuple[str, ...]
     mean: Floats
     half_width: Floats
+    games: NDArray[np.int64]
     mixtures: Mixtures
     value_interval: tuple[float, float]
     nash_conv: float
@@ -139,6 +150,7 @@ class Round:
             "defenders": list(self.defenders),
             "mean": self.mean.tolist(),
             "half_width": self.half_width.tolist(),
+            "games": self.games.tolist(),
             "spoofer_mixture": self.mixtures.spoofers.tolist(),
             "defender_mixture": self.mixtures.defenders.tolist(),
             "value": self.mixtures.value,
@@ -180,7 +192,13 @@ class League:
             _check_same(path, settings.content())
         else:
             files.write_json(path, settings.content())
-        self._cells = CellStore(folder / "cells", settings.duel, settings.games, settings.seed)
+        self._store = CellStore(folder / "cells", settings.duel, settings.games, settings.seed)
+        self._cells = self._begin()
+
+    def _begin(self) -> Allotment:
+        """No cell has been given any games."""
+        assert self.settings.most_games is not None
+        return Allotment(self._store, self.settings.most_games, self._engine)
 
     def play(self, notify: Notify = lambda _: None) -> list[Round]:
         """Play all rounds; what each found.
@@ -193,84 +211,84 @@ class League:
         """
         players = {SPOOFER: list(self.settings.spoofers), DEFENDER: list(self.settings.defenders)}
         frozen = self._frozen()
+        self._cells = self._begin()
         rounds: list[Round] = []
         for number in range(self.settings.rounds + 1):
-            solved, harms = self._solve(number, players, notify)
+            solved = self._solve(number, players, notify)
             self._check_frozen(solved.weights, frozen)
             if number < self.settings.rounds:
-                gains = self._respond(number, players, solved, harms, notify)
-                solved = Round(**{**vars(solved), "gains": gains})
+                solved = replace(solved, gains=self._respond(number, players, solved, notify))
             rounds.append(solved)
             files.write_json(self.folder / ROUNDS_FILE, [each.content() for each in rounds])
         return rounds
 
-    def _solve(
-        self, number: int, players: dict[str, list[str]], notify: Notify
-    ) -> tuple[Round, Floats]:
-        """Fill the matrix and solve it; the round, and the harm of every game, (S, D, G)."""
+    def _solve(self, number: int, players: dict[str, list[str]], notify: Notify) -> Round:
+        """Fill the matrix, with more games where they decide who is mixed in, and solve it."""
         spoofers, defenders = players[SPOOFER], players[DEFENDER]
-        cells = self._cells.matrix(spoofers, defenders, self._engine, notify)
-        harms: Floats = np.array([[cell.harm for cell in row] for row in cells])
-        mean = harms.mean(axis=2)
-        mixtures = META_STRATEGIES[self.settings.meta](mean)
+        meta = self.settings.meta
+        solve = META_STRATEGIES[meta]
+        cells = self._cells.settle(spoofers, defenders, lambda mean: CONTESTS[meta](mean, solve(mean)), notify)
+        mean, played = np.array([[cell.mean for cell in row] for row in cells]), harms(cells)
+        mixtures = solve(mean)
         notify(f"round {number}: value {mixtures.value:.4g}")
         policies = [player for player in (*spoofers, *defenders) if player.startswith(POLICY)]
-        solved = Round(
+        return Round(
             number,
             tuple(spoofers),
             tuple(defenders),
             mean,
             np.array([[0.5 * float(np.subtract(*cell.interval[::-1])) for cell in row] for row in cells]),
+            np.isfinite(played).sum(axis=2),
             mixtures,
-            value_interval(harms, self.settings.seed, self.settings.resamples),
+            value_interval(played, self.settings.seed, self.settings.resamples),
             nash_conv(mean, mixtures.spoofers, mixtures.defenders),
             exploitability(mean),
             {},
             {player: load_policy(policy_folder(player)).weights_digest for player in policies},
         )
-        return solved, harms
 
     def _respond(
-        self,
-        number: int,
-        players: dict[str, list[str]],
-        solved: Round,
-        harms: Floats,
-        notify: Notify,
+        self, number: int, players: dict[str, list[str]], solved: Round, notify: Notify
     ) -> dict[str, dict[str, Any]]:
         """Train a best response of each side, and take in those that gain; what each gained."""
-        mixtures, gains = solved.mixtures, {}
-        sides = {
-            SPOOFER: (players[DEFENDER], mixtures.defenders, 1.0),
-            DEFENDER: (players[SPOOFER], mixtures.spoofers, -1.0),
+        mixtures = solved.mixtures
+        opponents = {
+            SPOOFER: mixture(players[DEFENDER], mixtures.defenders),
+            DEFENDER: mixture(players[SPOOFER], mixtures.spoofers),
         }
         tasks = []
-        for place, (side, (others, weights, _)) in enumerate(sides.items()):
-            pool = mixture(others, weights)
+        for place, (side, pool) in enumerate(opponents.items()):
             seed = int(np.random.SeedSequence((self.settings.seed, number, place)).generate_state(1)[0])
             run = self.folder / "policies" / f"{side}-{number + 1}"
             name = f"round {number + 1}: a {side} is trained against {pool}"
             tasks.append(Task(name, self._train, (side, pool, run, seed)))
-        trained = dict(zip(sides, self._engine.run(tasks, notify), strict=True))
-        mixed = np.einsum("s,sdg,d->g", mixtures.spoofers, harms, mixtures.defenders)
-        for side, (others, weights, sign) in sides.items():
-            new, gained = trained[side], sign * (self._against(side, trained[side], others, weights, notify) - mixed)
-            low, high = mean_interval(gained)
-            joins = bool(low > ROUNDING * solved.mean.max())
-            gains[side] = {"player": new, "gain": float(gained.mean()), "gain_ci95": [low, high], "joins": joins}
+        trained = dict(zip(opponents, self._engine.run(tasks, notify), strict=True))
+        gains = {side: self._gain(side, new, solved, notify) for side, new in trained.items()}
         for side, gain in gains.items():
             if gain["joins"]:
                 players[side].append(gain["player"])
         return gains
 
-    def _against(self, side: str, new: str, others: Sequence[str], weights: Floats, notify: Notify) -> Floats:
-        """Harm of each game of a new player of one side against the mixture of the other, in the mean, (G,)."""
-        pairs = [(other, weight) for other, weight in zip(others, weights.tolist(), strict=True) if weight]
-        met = [other for other, _ in pairs]
-        rows, columns = ([new], met) if side == SPOOFER else (met, [new])
-        cells = [cell for row in self._cells.matrix(rows, columns, self._engine, notify) for cell in row]
-        summed: Floats = np.sum([weight * cell.harm for (_, weight), cell in zip(pairs, cells, strict=True)], axis=0)
-        return summed
+    def _gain(self, side: str, new: str, solved: Round, notify: Notify) -> dict[str, Any]:
+        """What a new player gains against the mixture of the other side, over the mixture of its own."""
+        spoofers, own = _met(solved.spoofers, solved.mixtures.spoofers)
+        defenders, other = _met(solved.defenders, solved.mixtures.defenders)
+        if side == SPOOFER:
+            weights = np.outer([*-own, 1.0], other)
+            spoofers.append(new)
+        else:
+            weights = np.outer(own, [*other, -1.0])
+            defenders.append(new)
+        contest = Contest(weights, None)
+        gained = paired(self._cells.settle(spoofers, defenders, lambda _: [contest], notify), weights)
+        low, high = mean_interval(gained)
+        return {
+            "player": new,
+            "gain": float(gained.mean()),
+            "gain_ci95": [low, high],
+            "games": len(gained),
+            "joins": bool(low > ROUNDING * solved.mean.max()),
+        }
 
     def _frozen(self) -> dict[str, str]:
         """Digests of the policies of rounds that have been played."""
@@ -285,6 +303,11 @@ class League:
         for player, digest in weights.items():
             if frozen.get(player, digest) != digest:
                 raise ValueError(f"{player} is not the policy that this league has played: its weights have changed")
+
+
+def _met(players: Sequence[str], weights: Floats) -> tuple[list[str], Floats]:
+    """The players of a side that are mixed in, and how often."""
+    return [name for name, weight in zip(players, weights.tolist(), strict=True) if weight], weights[weights > 0.0]
 
 
 def mixture(players: Sequence[str], weights: Floats) -> str:
@@ -310,6 +333,7 @@ def _check_same(path: Path, content: dict[str, Any]) -> None:
     with files.reading(path):
         found = json.loads(path.read_text(encoding="utf-8"))
         version = found["schema_version"]
+        found.setdefault("most_games", found["games"])  # the first leagues had as many in every cell
     if version != SCHEMA_VERSION:
         raise ValueError(f"{path} is of version {version!r}; this program plays version {SCHEMA_VERSION}")
     flat, wanted = _flat(found), _flat(content)

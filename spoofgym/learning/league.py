@@ -26,7 +26,7 @@ from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.evaluation.engine import ENGINES, Engine, Here, make_engine
 from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
-from spoofgym.learning.double_oracle import League, LeagueSettings
+from spoofgym.learning.double_oracle import MORE_GAMES, League, LeagueSettings
 from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WORLD_DETECTORS, tuned_for
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario
@@ -51,7 +51,9 @@ def parser() -> argparse.ArgumentParser:
     add("--clean", type=share, default=0.5, help="share of games without an attack (default: %(default)s)")
     add("--rounds", type=seed_number, default=5,
         help="of best responses; 0 = compare who is there at the beginning (default: %(default)s)")
-    add("--games", type=count, default=500, help="of each cell (default: %(default)s)")
+    add("--games", type=count, default=500, help="that each cell begins with (default: %(default)s)")
+    add("--most-games", type=count, metavar="N",
+        help=f"of a cell whose interval decides who is mixed in (default: {MORE_GAMES} times --games)")
     add("--meta", choices=tuple(META_STRATEGIES), default="nash", help="how a side is mixed (default: %(default)s)")
     add("--spoofer-steps", type=count, default=1_600_000, help="of each spoofer's training (default: %(default)s)")
     add("--defender-steps", type=count, default=800_000, help="of each defender's training (default: %(default)s)")
@@ -130,6 +132,7 @@ def settings_of(options: argparse.Namespace) -> LeagueSettings:
         defenders=defenders,
         rounds=options.rounds,
         games=options.games,
+        most_games=options.most_games,
         meta=options.meta,
         seed=options.seed,
         resamples=options.resamples,

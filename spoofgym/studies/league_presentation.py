@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 
 from spoofgym import files
@@ -30,14 +31,21 @@ def _unit(report: dict[str, Any]) -> str:
 
 def _rounds(report: dict[str, Any]) -> Table:
     title = f"{report['duel']['scenario']}, payoff {report['duel']['payoff']}: value of the game"
-    columns = ("round", "spoofers", "defenders", f"value{_unit(report)}", "spoofer gains", "defender gains")
+    value = f"value{_unit(report)}"
+    columns = ("round", "spoofers", "defenders", "games a cell", value, "spoofer gains", "defender gains")
     table = _table(title, columns)
     for found in report["results"]:
         low, high = found["value_ci95"]
         gains = [_gain(found["gains"].get(side)) for side in ("spoofer", "defender")]
         players = [str(len(found[side])) for side in ("spoofers", "defenders")]
-        table.add_row(str(found["number"]), *players, f"{found['value']:.3g} [{low:.3g}, {high:.3g}]", *gains)
+        games = _range(np.unique(found["games"]))
+        table.add_row(str(found["number"]), *players, games, f"{found['value']:.3g} [{low:.3g}, {high:.3g}]", *gains)
     return table
+
+
+def _range(numbers: NDArray[np.int64]) -> str:
+    """The smallest and the largest of some numbers; one where they are equal."""
+    return f"{numbers[0]:,}" if len(numbers) == 1 else f"{numbers[0]:,} to {numbers[-1]:,}"
 
 
 def _gain(gain: dict[str, Any] | None) -> str:

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from spoofgym.envs.duel_config import DuelConfig
@@ -51,11 +52,17 @@ def test_a_task_that_kills_its_workers_is_named() -> None:
 def test_a_matrix_is_equal_in_processes(tmp_path: Path) -> None:
     config = DuelConfig(scenario="foi-drive:horizon=30", detectors=("snapshot",))
     players = ("none", "ramp:1"), ("snapshot > latch", "always-exclude")
+    wanted = {(one, two): 10 for one in players[0] for two in players[1]}
+    wanted["ramp:1", "always-exclude"] = 15
+    grown, there = (CellStore(tmp_path / name, config, 10, 3) for name in ("here", "there"))
+    grown.matrix(*players, Here(), lambda _: None)
+    grown.fill(wanted, Here(), lambda _: None)
+    there.fill(wanted, Processes(2), lambda _: None)
     found = [
-        harms(CellStore(tmp_path / name, config, 10, 3).matrix(*players, engine, lambda _: None))
-        for name, engine in (("here", Here()), ("there", Processes(2)))
+        harms([[store.cell(one, two, wanted[one, two]) for two in players[1]] for one in players[0]])
+        for store in (grown, there)
     ]
-    assert (found[0] == found[1]).all()
+    np.testing.assert_array_equal(*found)
     told: list[str] = []
     CellStore(tmp_path / "there", config, 10, 3).matrix(*players, Here(), told.append)
     assert told == []  # all is on disk

@@ -25,7 +25,7 @@ DEFENDERS = ("snapshot > exclude:reuse=5", "windowed:n=5,threshold=25 > latch", 
 QUIET = {"clean": 0.3, "outage": 0.0, "multipath": 0.0}
 DUEL = with_detectors_of(DuelConfig(scenario="foi-drive:horizon=60", detectors=("snapshot",), **QUIET), DEFENDERS)
 SETTINGS = LeagueSettings(
-    duel=DUEL, spoofers=SPOOFERS[:1], defenders=DEFENDERS[:1], rounds=5, games=40, seed=3, resamples=20
+    duel=DUEL, spoofers=SPOOFERS[:1], defenders=DEFENDERS[:1], rounds=5, games=40, most_games=40, seed=3, resamples=20
 )
 
 
@@ -101,6 +101,58 @@ def test_a_league_that_is_killed_goes_on(kill: int, whole: np.ndarray, tmp_path:
         assert (tmp_path / "once" / name).read_text() == (tmp_path / "twice" / name).read_text()
 
 
+CLOSE = replace(SETTINGS, spoofers=SPOOFERS, defenders=DEFENDERS, rounds=1, games=10, most_games=40)
+"""Few games decide nothing: those that matter are played until the enumerated game is there."""
+
+
+def test_cells_get_more_games_where_they_decide_who_is_mixed_in(whole: np.ndarray, tmp_path: Path) -> None:
+    rounds = League(CLOSE, tmp_path, enumerating(whole)).play()
+    last, exact = rounds[-1], nash(whole)
+    assert set(np.unique(last.games)) <= {10, 20, 40}
+    assert last.games.min() < 40 == last.games.max()
+    assert last.mixtures.value == pytest.approx(exact.value, rel=1e-9)
+    assert nash_conv(whole, last.mixtures.spoofers, last.mixtures.defenders) == pytest.approx(0.0, abs=1e-9)
+    # every cell is the mean of its first games
+    cells = harms(play_matrix(DUEL, SPOOFERS, DEFENDERS, 40, SETTINGS.seed))
+    for place in np.ndindex(3, 3):
+        assert last.mean[place] == pytest.approx(cells[place][: last.games[place]].mean(), rel=1e-12)
+
+
+def test_a_league_that_is_killed_between_games_ends_alike(whole: np.ndarray, tmp_path: Path) -> None:
+    """Again and again; the cells on disk then have more games than the rounds that are gone through again."""
+    best, told = enumerating(whole), []
+    League(CLOSE, tmp_path / "once", best).play(told.append)
+    assert any(", games 10 to 19" in line for line in told)
+
+    class Kill:
+        left = 12
+
+        def __call__(self, line: str) -> None:
+            self.left -= 1
+            if not self.left:
+                raise KeyboardInterrupt
+
+    for _ in range(len(told)):
+        try:
+            League(CLOSE, tmp_path / "twice", best).play(Kill())
+        except KeyboardInterrupt:
+            continue
+        break
+    League(CLOSE, tmp_path / "twice", best).play()
+    assert (tmp_path / "once" / ROUNDS_FILE).read_text() == (tmp_path / "twice" / ROUNDS_FILE).read_text()
+
+
+def test_a_league_of_before_has_as_many_games_everywhere(whole: np.ndarray, tmp_path: Path) -> None:
+    settings = replace(SETTINGS, rounds=0)
+    League(settings, tmp_path, enumerating(whole)).play()
+    content = json.loads((tmp_path / SETTINGS_FILE).read_text())
+    del content["most_games"]
+    (tmp_path / SETTINGS_FILE).write_text(json.dumps(content))
+    with pytest.raises(ValueError, match="its most_games is 40, not 160"):
+        League(replace(settings, most_games=None), tmp_path, enumerating(whole))
+    League(settings, tmp_path, enumerating(whole)).play()
+
+
 def test_another_league_is_refused(whole: np.ndarray, tmp_path: Path) -> None:
     best = enumerating(whole)
     League(replace(SETTINGS, rounds=0), tmp_path, best).play()
@@ -147,6 +199,7 @@ def test_mixtures_are_spelled_as_pools() -> None:
     [
         ({"spoofers": ()}, "at least one spoofer and one defender"),
         ({"games": 1}, "games must be"),
+        ({"most_games": 39}, "most_games must be a whole number, 40 or more"),
         ({"meta": "best"}, "meta must be"),
         ({"rounds": -1}, "rounds must be"),
     ],
