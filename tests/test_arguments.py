@@ -1,14 +1,19 @@
 """Whatever is given is played without a warning, or refused with the name of the argument and of its owner."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from spoofgym.attacks import make_attack
+from spoofgym.attacks.pool import training_population
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.cpi import unit_vector
+from spoofgym.envs.config import SpooferConfig, arguments_of, configuration, configure
 from spoofgym.envs.defender import DefenderEnv
+from spoofgym.envs.duel_config import DuelDefenderConfig
+from spoofgym.envs.duel_sides import DuelDefenderEnv, DuelSpooferEnv
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.vector import SpooferVectorEnv
 from spoofgym.scenarios import make_scenario
@@ -53,13 +58,49 @@ def test_arguments_of_the_environments_are_refused_by_name(kind, arguments, mess
     ("kind", "arguments", "message"),
     [
         (SpooferEnv, {"scenario": ["liu-flight"]}, "Spoofer-v0: scenario: scenario must be a specification"),
-        (SpooferEnv, {"response": None}, "Spoofer-v0: response: response must be a specification"),
+        (SpooferEnv, {"on_alarm": "respond", "response": None}, "Spoofer-v0: response: response must be a spec"),
         (DefenderEnv, {"detectors": 5}, "Defender-v0: detectors: detector must be a specification"),
     ],
 )
 def test_what_is_no_part_at_all_is_refused_by_name(kind, arguments, message):
     with pytest.raises(TypeError, match=message):
         kind(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "message"),
+    [
+        (SpooferEnv, {"response": "exclude"}, "Spoofer-v0: response 'exclude' needs on_alarm='respond'"),
+        (SpooferVectorEnv, {"response": ("latch", "exclude")}, "Spoofer-v0: response .* needs on_alarm='respond'"),
+        (SpooferEnv, {"on_alarm": "respond", "forfeit": 1.0}, "Spoofer-v0: forfeit 1.0 needs on_alarm='end'"),
+        (SpooferEnv, {"tracking_time": 4.0}, "Spoofer-v0: tracking_time 4.0 needs a tracking_sigma"),
+        (DuelSpooferEnv, {"tracking_time": 4.0}, "duel: tracking_time 4.0 needs a tracking_sigma"),
+        (DefenderEnv, {"attacks": training_population(), "clean": 0.5}, "Defender-v0: clean 0.5 is given twice"),
+        (DuelDefenderEnv, {"spoofer": training_population(), "clean": 0.5}, "duel: clean 0.5 is given twice"),
+        *(
+            (DuelDefenderEnv, {name: value}, f"duel: {name} .* is of a spoofer outside")
+            for name, value in (
+                *(("knowledge", "full"), ("action", "innovation"), ("frames", 2), ("shadow", SHORT)),
+                *(("tracking_sigma", 1.0), ("tracking_time", 1.0)),
+            )
+        ),
+    ],
+)
+def test_arguments_without_effect_are_refused(kind, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        kind(**arguments)
+
+
+def test_a_configuration_of_before_builds_its_environment():
+    """A run folder holds all arguments, and a league has one duel for both sides."""
+    kept = configuration(SpooferConfig, {"scenario": SHORT, "response": "latch", "tracking_time": 4.0})
+    given = arguments_of(kept)
+    assert not {"response", "tracking_time"} & set(given)
+    assert SpooferEnv(**given).config == replace(kept, response="exclude", tracking_time=0.0)
+    assert "forfeit" not in arguments_of(replace(kept, on_alarm="respond"))
+    both = DuelDefenderConfig(knowledge="full", frames=2, clean=0.25)
+    assert {"clean", "payoff"} < set(arguments_of(both))
+    assert configure(DuelDefenderConfig, arguments_of(both)) == replace(both, knowledge="shadow", frames=1)
 
 
 def test_whole_numbers_may_come_as_numbers_of_any_kind():

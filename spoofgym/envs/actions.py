@@ -31,26 +31,34 @@ def as_numbers(what: str, given: Any, shape: tuple[int, ...] | None) -> NDArray[
     return array
 
 
-def rates(given: Any, shape: tuple[int, int]) -> Floats:
+def rates(player: str, given: Any, shape: tuple[int, int]) -> Floats:
     """Continuous actions of N lanes as finite numbers of double precision; they may lie outside [-1, 1].
+
+    Args:
+        player: whose they are, for the message.
+        given: by the player.
+        shape: that they must have.
 
     Raises:
         ValueError: they are not finite, or what `as_numbers` refuses.
     """
-    actions = as_numbers("actions", given, shape)
+    actions = as_numbers(f"the actions of the {player}", given, shape)
     if not np.isfinite(actions).all():
         lane = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
-        raise ValueError(f"action of lane {lane} is not finite: {actions[lane]}; valid are numbers from -1 to 1")
+        raise ValueError(
+            f"action of the {player} in lane {lane} is not finite: {actions[lane]}; valid are numbers from -1 to 1"
+        )
     if actions.dtype.itemsize > np.dtype(np.float64).itemsize:  # numbers that double precision does not reach
         actions = np.clip(actions, -1.0, 1.0)
     return np.asarray(actions, dtype=np.float64)
 
 
-def choices(given: Any, num_lanes: int, numbers: Runs, valid: str) -> Runs:
+def choices(player: str, given: Any, num_lanes: int, numbers: Runs, valid: str) -> Runs:
     """Discrete actions of N lanes as whole numbers.
 
     Args:
-        given: by the players.
+        player: whose they are, for the message.
+        given: by the player.
         num_lanes: N.
         numbers: of values that each part of an action has, from 0 on, (D,).
         valid: what is, for the message.
@@ -58,11 +66,13 @@ def choices(given: Any, num_lanes: int, numbers: Runs, valid: str) -> Runs:
     Raises:
         ValueError: one is no whole number or not among the values, or what `as_numbers` refuses.
     """
-    actions = as_numbers("actions", given, (num_lanes, len(numbers)))
+    actions = as_numbers(f"the actions of the {player}", given, (num_lanes, len(numbers)))
     right = (actions >= 0) & (actions < numbers)
     if actions.dtype.kind == "f":
         right &= np.trunc(actions) == actions
     if not right.all():
         lane = int(np.flatnonzero(~right.all(axis=1))[0])
-        raise ValueError(f"action of lane {lane} must be whole numbers, {valid}, got {actions[lane]}")
+        raise ValueError(
+            f"action of the {player} in lane {lane} must be whole numbers, {valid}, got {actions[lane]}"
+        )
     return actions.astype(np.int64)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, TypeAlias, TypeVar
 
 from spoofgym import validation
 from spoofgym.attacks.base import KNOWLEDGE, Attack
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
 from spoofgym.navigation.family import COUPLINGS
 from spoofgym.responses.base import Response
@@ -30,8 +32,54 @@ Weighted: TypeAlias = str | Part | tuple[str | Part, float]
 """A member of a pool: a specification or an object, or a pair of one of these and its weight."""
 
 
-def configure(kind: type[Config], arguments: dict[str, Any]) -> Config:
-    """Build a configuration from keyword arguments.
+@dataclass(frozen=True)
+class Idle:
+    """Arguments that have no effect beside certain others.
+
+    Attributes:
+        names: of the arguments.
+        where: whether they have none, of a configuration and the names of the arguments that were given.
+        needs: what they need, for the message.
+    """
+
+    names: tuple[str, ...]
+    where: Callable[[Any, Collection[str]], bool]
+    needs: str
+
+
+TIME_ALONE = Idle(
+    ("tracking_time",),
+    lambda config, given: config.tracking_sigma == 0.0 and "tracking_sigma" not in given,
+    "needs a tracking_sigma, the size of the error whose correlation time it is",
+)
+
+
+def clean_of_pool(name: str) -> Idle:
+    """The share of clean games, where the argument ``name`` is a pool of attacks, which has its own."""
+    return Idle(
+        ("clean",),
+        lambda config, _: isinstance(getattr(config, name), AttackPool),
+        f"is given twice: the AttackPool that {name} is has a share of its own",
+    )
+
+
+def configure(kind: type[Config], arguments: Mapping[str, Any]) -> Config:
+    """The configuration that a person asks for by keyword arguments.
+
+    Raises:
+        TypeError: an unknown key; the message lists the valid ones.
+        ValueError: an argument that has no effect beside the others.
+    """
+    config = configuration(kind, arguments)
+    for idle in kind.idle:  # type: ignore[attr-defined]
+        for name in idle.names:
+            if name in arguments and idle.where(config, arguments):
+                raise ValueError(f"{kind.owner}: {name} {validation.shown(arguments[name])} {idle.needs}")  # type: ignore[attr-defined]
+    return config
+
+
+def configuration(kind: type[Config], arguments: Mapping[str, Any]) -> Config:
+    """The configuration of all arguments that one had before, those without effect included.
 
     Raises:
         TypeError: an unknown key; the message lists the valid ones.
@@ -41,6 +89,12 @@ def configure(kind: type[Config], arguments: dict[str, Any]) -> Config:
         if key not in valid:
             raise TypeError(f"unknown argument {key!r}; valid arguments: {', '.join(valid)}")
     return kind(**arguments)
+
+
+def arguments_of(config: Any) -> dict[str, Any]:
+    """The arguments that build an environment of this configuration: those that have an effect."""
+    without = {name for idle in config.idle if idle.where(config, ()) for name in idle.names}
+    return {name: value for name, value in vars(config).items() if name not in without}
 
 
 def check_options(owner: str, options: object, valid: tuple[str, ...] = ()) -> None:
@@ -76,12 +130,26 @@ class SpooferConfig:
 
     Attributes:
         owner: the environment, for messages.
+        idle: arguments that have no effect beside others.
 
     Raises:
         ValueError: a name that is not valid, or a number out of range.
     """
 
     owner: ClassVar[str] = "Spoofer-v0"
+    idle: ClassVar[tuple[Idle, ...]] = (
+        Idle(
+            ("response",),
+            lambda config, _: config.on_alarm == "end",
+            "needs on_alarm='respond': with on_alarm='end' an alarm ends the game and nobody responds to it",
+        ),
+        Idle(
+            ("forfeit",),
+            lambda config, _: config.on_alarm == "respond",
+            "needs on_alarm='end': with on_alarm='respond' an alarm takes nothing back",
+        ),
+        TIME_ALONE,
+    )
 
     scenario: str | Scenario = "liu-flight"
     detector: str | Detector | tuple[str | Detector, ...] = "snapshot"
@@ -129,12 +197,14 @@ class DefenderConfig:
 
     Attributes:
         owner: the environment, for messages.
+        idle: arguments that have no effect beside others.
 
     Raises:
         ValueError: a number out of range.
     """
 
     owner: ClassVar[str] = "Defender-v0"
+    idle: ClassVar[tuple[Idle, ...]] = (clean_of_pool("attacks"),)
 
     scenario: str | Scenario = "foi-drive"
     attacks: str | Attack | tuple[Weighted[Attack], ...] = "training"

@@ -150,7 +150,7 @@ class DefenderSeat:
         Raises:
             ValueError: an action lies outside the action space or is no number, or the actions have the wrong shape.
         """
-        return choices(actions, len(self._all), self.space.nvec, self._valid)
+        return choices("defender", actions, len(self._all), self.space.nvec, self._valid)
 
     def act(self, actions: Runs) -> Decision:
         """What becomes of the present fixes.

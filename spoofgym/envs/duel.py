@@ -15,7 +15,7 @@ from spoofgym.envs.actions import as_numbers
 from spoofgym.envs.config import configure
 from spoofgym.envs.defender_rendering import DefenderFigure
 from spoofgym.envs.duel_config import DuelConfig
-from spoofgym.envs.duel_game import AGENTS, DEFENDER, SPOOFER, DuelGame
+from spoofgym.envs.duel_game import AGENTS, DEFENDER, SPOOFER, DuelGame, check_agents
 from spoofgym.envs.single import LANE, only_lane
 
 try:
@@ -141,7 +141,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
     Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
-    valid.
+    valid. So is a `tracking_time` without a `tracking_sigma`.
 
     ## One side, and many lanes
 
@@ -222,9 +222,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
         """
         if not self.agents:
             raise RuntimeError("the game is over: call reset() first")
-        if set(actions) != set(AGENTS):
-            named = ", ".join(map(str, actions)) or "nobody"
-            raise ValueError(f"duel: a step needs the actions of {SPOOFER} and {DEFENDER}, got those of {named}")
+        check_agents(actions, AGENTS)
         lanes = {
             agent: as_numbers(f"the action of the {agent}", actions[agent], self._action_spaces[agent].shape)[None]
             for agent in AGENTS

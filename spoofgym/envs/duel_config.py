@@ -8,7 +8,15 @@ from typing import ClassVar
 from spoofgym import validation
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
-from spoofgym.envs.config import DEFENDER_DETECTORS, DefenderConfig, SpooferConfig, Weighted
+from spoofgym.envs.config import (
+    DEFENDER_DETECTORS,
+    TIME_ALONE,
+    DefenderConfig,
+    Idle,
+    SpooferConfig,
+    Weighted,
+    clean_of_pool,
+)
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 
@@ -25,9 +33,16 @@ class _Defender(DefenderConfig):
 class DuelConfig:
     """Arguments of the duel; the page of `spoofgym.envs.duel.DuelParallelEnv` says what each means.
 
+    Attributes:
+        owner: the environment, for messages.
+        idle: arguments that have no effect beside others.
+
     Raises:
         ValueError: a name that is not valid, or a number out of range.
     """
+
+    owner: ClassVar[str] = "duel"
+    idle: ClassVar[tuple[Idle, ...]] = (TIME_ALONE,)
 
     scenario: str | Scenario = "foi-drive"
     detectors: str | Detector | tuple[str | Detector, ...] = DEFENDER_DETECTORS
@@ -101,7 +116,19 @@ class DuelSpooferConfig(DuelConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class DuelDefenderConfig(DuelConfig):
-    """Arguments of DuelDefender-v0: those of the duel, and who spoofs."""
+    """Arguments of DuelDefender-v0: those of the duel, and who spoofs.
+
+    Those of a spoofer outside stay, so that a league has one duel for both of its sides.
+    """
+
+    idle: ClassVar[tuple[Idle, ...]] = (
+        Idle(
+            ("knowledge", "action", "tracking_sigma", "tracking_time", "frames", "shadow"),
+            lambda *_: True,
+            "is of a spoofer outside: that of DuelDefender-v0 sits inside, and 'spoofer' says who it is",
+        ),
+        clean_of_pool("spoofer"),
+    )
 
     spoofer: str | Attack | tuple[Weighted[Attack], ...] = "training"
 

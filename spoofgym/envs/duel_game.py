@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -179,8 +180,10 @@ class DuelGame(Game):
             restarting: indices of lanes.
 
         Raises:
-            ValueError: an action that its seat refuses; nothing has been played then.
+            ValueError: the actions are not those of the agents outside, or one is refused by its seat; nothing has been
+                played then.
         """
+        check_agents(actions, tuple(self.seats))
         decided = ~self.simulation.decision.use
         self.advance(actions.get(SPOOFER), actions.get(DEFENDER), restarting)
         self.excluding = decided if self.defender is None else self.defender.excluding
@@ -296,6 +299,21 @@ class DuelDefenderGame(_OneSide):
         super().__init__(config, num_lanes, spoofer=config.spoofer, streams=streams)
         assert self.defender is not None
         self.seat = self.defender
+
+
+def check_agents(actions: object, agents: Sequence[str]) -> None:
+    """Refuse what does not name exactly the actions of some agents.
+
+    Raises:
+        ValueError: an action is missing, or an agent unknown; or it is no dictionary.
+    """
+    if not isinstance(actions, Mapping):
+        raise ValueError(f"{OWNER}: a step needs a dictionary of actions by agent, got {validation.shown(actions)}")
+    if set(actions) != set(agents):
+        named = ", ".join(map(str, actions)) or "nobody"
+        raise ValueError(
+            f"{OWNER}: a step needs the actions of {' and '.join(agents) or 'nobody'}, got those of {named}"
+        )
 
 
 def _spoofer_seat(simulation: Simulation, config: DuelConfig, detectors: list[str]) -> SpooferSeat:

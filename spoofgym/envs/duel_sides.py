@@ -116,7 +116,8 @@ class DuelDefenderEnv(_SideEnv):
 
     ## Arguments
 
-    Those of the duel, and
+    Those of the duel, without those of a spoofer outside (`knowledge`, `action`, `tracking_sigma`, `tracking_time`,
+    `frames`, `shadow`): the one inside brings its own. And
 
     | Name | Default | Meaning |
     |---|---|---|

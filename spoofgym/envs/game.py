@@ -85,8 +85,8 @@ class Game:
             ValueError: an action that its seat refuses; nothing has been played then.
         """
         simulation, spoofer, defender = self.simulation, self.spoofer, self.defender
-        moves = None if spoofer is None else spoofer.read(_given(rates))
-        choices = None if defender is None else defender.read(_given(decisions))
+        moves = None if spoofer is None else spoofer.read(_given("spoofer", rates))
+        choices = None if defender is None else defender.read(_given("defender", decisions))
         simulation.resolve(None if defender is None or choices is None else defender.act(choices))
         for part in self._watching:
             part.resolved()
@@ -130,12 +130,12 @@ class Game:
         return Standing(alarm, caught, diverged, caught | at_end | diverged)
 
 
-def _given(actions: NDArray[Any] | None) -> NDArray[Any]:
+def _given(player: str, actions: NDArray[Any] | None) -> NDArray[Any]:
     """The actions of a player outside.
 
     Raises:
         ValueError: there are none.
     """
     if actions is None:
-        raise ValueError("a seat is filled from outside, and the step has no actions for it")
+        raise ValueError(f"the {player}'s seat is filled from outside, and the step has no actions for it")
     return actions

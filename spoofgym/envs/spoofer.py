@@ -177,8 +177,9 @@ class SpooferEnv(SingleEnv):
     | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
 
     Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
-    valid. Numbers have limits far beyond what a game needs, so that nothing overflows and memory stays in bounds:
-    `frames` is 1000 at most, `tracking_sigma` 1e6 m, `forfeit` 1e6.
+    valid. So is one that would have no effect: a `response` without `on_alarm="respond"`, a `forfeit` with it, and a
+    `tracking_time` where no `tracking_sigma` is given. Numbers have limits far beyond what a game needs, so that
+    nothing overflows and memory stays in bounds: `frames` is 1000 at most, `tracking_sigma` 1e6 m, `forfeit` 1e6.
 
     `tracking_sigma`: the spoofer knows the vehicle's position with this error per axis and epoch, which adds to the
     offset that it means to send, and its velocity with an independent one over the interval. It changes what is sent

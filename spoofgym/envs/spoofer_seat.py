@@ -198,7 +198,7 @@ class SpooferSeat:
         Raises:
             ValueError: an action is not finite or no number, or the actions have the wrong shape.
         """
-        return np.minimum(np.maximum(rates(actions, self.offset.shape), -1.0), 1.0)
+        return np.minimum(np.maximum(rates("spoofer", actions, self.offset.shape), -1.0), 1.0)
 
     def act(self, actions: Floats, restarting: Runs | None = None) -> Floats:
         """What is sent at the coming epoch.

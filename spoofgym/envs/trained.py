@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from spoofgym import files
-from spoofgym.envs.config import DefenderConfig, SpooferConfig, configure
+from spoofgym.envs.config import DefenderConfig, SpooferConfig, configuration
 from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.policies.learned import (
     DEFENDER,
@@ -107,7 +107,7 @@ def config_from(kind: type[Config], arguments: Mapping[str, Any], path: Path) ->
     if player != PLAYERS[kind]:
         raise ValueError(f"{path.parent} is the run folder of a {player}, not of a {PLAYERS[kind]}")
     with files.reading(path):
-        return configure(kind, {name: _checked(name, value) for name, value in arguments.items()})
+        return configuration(kind, {name: _checked(name, value) for name, value in arguments.items()})
 
 
 def _checked(name: str, value: Any) -> Any:

@@ -118,6 +118,8 @@ class CellStore:
             return None
         arrays = read_arrays(path)
         with files.reading(path):
+            if not {"harm", "clean"} <= set(arrays):
+                raise ValueError("it lacks the harm of its games, or which of them are clean")
             harm, clean = arrays["harm"], arrays["clean"]
             right = harm.ndim == 1 and harm.shape == clean.shape and len(harm) >= self._games
             if not right or clean.dtype != np.bool_ or not np.isfinite(harm).all():

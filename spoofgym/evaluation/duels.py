@@ -91,6 +91,24 @@ def play_cell(config: DuelConfig, spoofer: Any, defender: Any, games: int, seed:
     return Cell(*names, np.concatenate(harm), np.concatenate(clean))
 
 
+def check_players(config: DuelConfig, spoofers: Sequence[Any], defenders: Sequence[Any]) -> None:
+    """Refuse players that cannot play a duel, before anybody plays.
+
+    Args:
+        config: arguments of the duel, with the detectors that the players need.
+        spoofers: as `spoofgym.envs.opponents` spells them.
+        defenders: as well.
+
+    Raises:
+        ValueError: a player that is unknown or does not fit.
+        FileNotFoundError: a folder that holds no policy.
+    """
+    for spoofer in spoofers:
+        DuelGame(config, 1, spoofer=spoofer)
+    for defender in defenders:
+        DuelGame(config, 1, defender=defender)
+
+
 def _name(given: Any, found: str) -> str:
     return given if isinstance(given, str) else found
 

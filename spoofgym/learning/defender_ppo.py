@@ -22,7 +22,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 from torch import nn
 
-from spoofgym.envs.config import DefenderConfig
+from spoofgym.envs.config import DefenderConfig, arguments_of
 from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.envs.duel_config import DuelDefenderConfig
 from spoofgym.envs.sb3 import SB3VecEnv
@@ -240,7 +240,7 @@ def lanes(config: AnyDefenderConfig, settings: Settings) -> DefendingVectorEnv:
     """The lanes of a training."""
     trained = replace(config, clean=settings.clean)
     kind = DuelDefenderVectorEnv if isinstance(config, DuelDefenderConfig) else DefenderVectorEnv
-    return kind(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(trained))
+    return kind(settings.lanes, autoreset_mode=AutoresetMode.SAME_STEP, **arguments_of(trained))
 
 
 def begin(learner: PPO, config: AnyDefenderConfig, settings: Settings, seed: int) -> None:

@@ -25,7 +25,7 @@ from spoofgym.envs.duel_game import DEFENDER, SPOOFER
 from spoofgym.evaluation.allotment import Allotment, paired
 from spoofgym.evaluation.cell_store import CellStore
 from spoofgym.evaluation.contests import CONTESTS, ROUNDING, Contest
-from spoofgym.evaluation.duels import harms
+from spoofgym.evaluation.duels import check_players, harms
 from spoofgym.evaluation.engine import Engine, Here, Notify, Task
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.evaluation.payoff import (
@@ -182,7 +182,8 @@ class League:
             engine: plays cells and trains; None = here, one after the other.
 
         Raises:
-            ValueError: the folder holds another league, or one of another version; or nothing can be written there.
+            ValueError: the folder holds another league, or one of another version; nothing can be written there; or a
+                player is unknown or does not fit.
         """
         files.check_folder(folder)
         self.settings, self.folder, self._train = settings, folder, train
@@ -191,6 +192,7 @@ class League:
         if path.exists():
             _check_same(path, settings.content())
         else:
+            check_players(settings.duel, settings.spoofers, settings.defenders)
             files.write_json(path, settings.content())
         self._store = CellStore(folder / "cells", settings.duel, settings.games, settings.seed)
         self._cells = self._begin()
@@ -297,6 +299,8 @@ class League:
             return {}
         with files.reading(path):
             rounds = json.loads(path.read_text(encoding="utf-8"))
+            if not isinstance(rounds, list):
+                raise ValueError("it is no list of rounds")
             return {player: str(digest) for each in rounds for player, digest in each["weights"].items()}
 
     def _check_frozen(self, weights: dict[str, str], frozen: dict[str, str]) -> None:
@@ -332,8 +336,10 @@ def _check_same(path: Path, content: dict[str, Any]) -> None:
     """
     with files.reading(path):
         found = json.loads(path.read_text(encoding="utf-8"))
-        version = found["schema_version"]
-        found.setdefault("most_games", found["games"])  # the first leagues had as many in every cell
+        if not isinstance(found, dict):
+            raise ValueError("it does not say what a league is")
+        version = found.get("schema_version")
+        found.setdefault("most_games", found.get("games"))  # the first leagues had as many in every cell
     if version != SCHEMA_VERSION:
         raise ValueError(f"{path} is of version {version!r}; this program plays version {SCHEMA_VERSION}")
     flat, wanted = _flat(found), _flat(content)

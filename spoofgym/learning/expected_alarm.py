@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Runs
 from spoofgym.detectors.chi_square import Snapshot
-from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.config import SpooferConfig, arguments_of
 from spoofgym.envs.vector import SpooferVectorEnv
 from spoofgym.optimum.survival import log_survival
 from spoofgym.scenarios import make_scenario
@@ -64,7 +64,7 @@ class ExpectedAlarmVectorEnv(SpooferVectorEnv):
         if not alarm_probability_is_known(config):
             raise ValueError(f"the probability of an alarm is not known in this game: {config}")
         endless = replace(config, on_alarm="respond", response="always-use")
-        super().__init__(num_envs, **arguments, **vars(endless))  # type: ignore[arg-type]
+        super().__init__(num_envs, **arguments, **arguments_of(endless))  # type: ignore[arg-type]
         (detector,) = self.game.simulation.detectors.values()
         assert isinstance(detector, Snapshot)
         assert detector.threshold is not None

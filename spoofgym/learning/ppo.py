@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
-from spoofgym.envs.config import SpooferConfig
+from spoofgym.envs.config import SpooferConfig, arguments_of
 from spoofgym.envs.duel_config import DuelSpooferConfig
 from spoofgym.envs.sb3 import SB3VecEnv
 from spoofgym.envs.vector import DuelSpooferVectorEnv, SpooferVectorEnv
@@ -104,10 +104,10 @@ def make_learner(config: AnySpooferConfig, settings: Settings, seed: int, folder
 def _lanes(config: AnySpooferConfig, lanes: int) -> SpooferVectorEnv | DuelSpooferVectorEnv:
     """The game, with alarms in expectation where their probability is known."""
     if isinstance(config, DuelSpooferConfig):
-        return DuelSpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
+        return DuelSpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **arguments_of(config))
     if alarm_probability_is_known(config):
         return ExpectedAlarmVectorEnv(lanes, config, autoreset_mode=AutoresetMode.SAME_STEP)
-    return SpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **vars(config))
+    return SpooferVectorEnv(lanes, autoreset_mode=AutoresetMode.SAME_STEP, **arguments_of(config))
 
 
 def export(learner: PPO, config: AnySpooferConfig, folder: Path) -> LearnedSpoofer:

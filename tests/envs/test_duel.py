@@ -249,6 +249,25 @@ def test_bad_actions_are_refused_and_nothing_is_played(actions: dict[str, Any], 
     assert env.game.index[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        (None, "duel: a step needs a dictionary of actions by agent, got None"),
+        ({"spoofer": np.zeros((2, 3))}, "a step needs the actions of spoofer and defender, got those of spoofer"),
+        ({"spoofer": np.zeros((2, 4)), "defender": np.zeros((2, 2))}, "the actions of the spoofer must have shape"),
+        ({"spoofer": np.full((2, 3), np.nan), "defender": np.zeros((2, 2))}, "action of the spoofer in lane 0 is not"),
+        ({"spoofer": np.zeros((2, 3)), "defender": [[0, 0], [0, 99]]}, "action of the defender in lane 1 must be"),
+        ({"spoofer": np.zeros((2, 3)), "defender": None}, "the defender's seat is filled from outside"),
+    ],
+)
+def test_bad_actions_of_many_lanes_name_whose_they_are(actions: Any, message: str) -> None:
+    env = duel.vector_env(2, **SHORT)
+    env.reset(seed=SEED)
+    with pytest.raises(ValueError, match=re.escape(message)):
+        env.step(actions)
+    assert (env.game.index == 0).all()
+
+
 def test_a_game_that_is_over_is_over() -> None:
     env = duel.parallel_env(**SHORT)
     with pytest.raises(RuntimeError, match="call reset"):

@@ -141,7 +141,7 @@ def test_user_limit_truncates() -> None:
         ({"action": "jump"}, ValueError, "action must be one of rate, innovation, got 'jump'"),
         ({"fidelity": "real"}, ValueError, "'real'.*linear, strapdown"),
         ({"on_alarm": "cry"}, ValueError, "on_alarm must be one of end, respond, got 'cry'"),
-        ({"response": "cry"}, ValueError, "'cry'.*exclude"),
+        ({"on_alarm": "respond", "response": "cry"}, ValueError, "'cry'.*exclude"),
         ({"render_mode": "human"}, ValueError, "render_mode must be one of rgb_array, got 'human'"),
         ({"forfeit": -1.0}, ValueError, "forfeit"),
         ({"forfeit": float("inf")}, ValueError, "forfeit"),

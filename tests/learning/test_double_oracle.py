@@ -1,5 +1,6 @@
 """Leagues: a tiny game whose every best response is enumerated, resumption from any kill, and what is refused."""
 
+import io
 import json
 import re
 from collections.abc import Callable
@@ -164,17 +165,45 @@ def test_another_league_is_refused(whole: np.ndarray, tmp_path: Path) -> None:
     (tmp_path / SETTINGS_FILE).write_text(json.dumps({**content, "schema_version": 9}))
     with pytest.raises(ValueError, match="is of version 9; this program plays version 1"):
         League(SETTINGS, tmp_path, best)
-    (tmp_path / SETTINGS_FILE).write_text("{")
-    with pytest.raises(ValueError, match=re.escape(f"{SETTINGS_FILE} is damaged")):
-        League(SETTINGS, tmp_path, best)
+    for text in ("{", "[]"):
+        (tmp_path / SETTINGS_FILE).write_text(text)
+        with pytest.raises(ValueError, match=re.escape(f"{SETTINGS_FILE} is damaged")):
+            League(SETTINGS, tmp_path, best)
+
+
+def test_rounds_that_are_damaged_are_named(whole: np.ndarray, tmp_path: Path) -> None:
+    league = League(replace(SETTINGS, rounds=0), tmp_path, enumerating(whole))
+    for text in ("{}", "[1]", "["):
+        (tmp_path / ROUNDS_FILE).write_text(text)
+        with pytest.raises(ValueError, match=re.escape(f"{ROUNDS_FILE} is damaged")):
+            league.play()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"spoofers": ("ramp:1", "nobody")}, "unknown attack 'nobody'"),
+        ({"defenders": ("policy:nobody",)}, "'nobody' is no run folder and no published agent"),
+        ({"defenders": ("cusum > exclude",)}, "cusum"),
+    ],
+)
+def test_a_player_that_cannot_play_is_refused_before_anything_is_written(
+    changes: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        League(replace(SETTINGS, **changes), tmp_path / "league", lambda *_: "")
+    assert not (tmp_path / "league").exists()
 
 
 def test_a_damaged_cell_is_named(whole: np.ndarray, tmp_path: Path) -> None:
     League(replace(SETTINGS, rounds=0), tmp_path, enumerating(whole)).play()
     (cell,) = (tmp_path / "cells").iterdir()
-    cell.write_bytes(cell.read_bytes()[:-5])
-    with pytest.raises(ValueError, match=re.escape(f"{cell.name} is damaged")):
-        League(replace(SETTINGS, rounds=0), tmp_path, enumerating(whole)).play()
+    whole_file, few = cell.read_bytes(), io.BytesIO()
+    np.savez(few, harm=np.zeros(3), clean=np.zeros(3, bool))
+    for content in (whole_file[:-5], few.getvalue(), b""):
+        cell.write_bytes(content)
+        with pytest.raises(ValueError, match=re.escape(f"{cell.name} is damaged")):
+            League(replace(SETTINGS, rounds=0), tmp_path, enumerating(whole)).play()
 
 
 def test_a_frozen_policy_stays_as_it_is(tmp_path: Path) -> None:
