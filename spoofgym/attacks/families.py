@@ -32,6 +32,33 @@ BEFORE_MANOEUVRE = 10.0
 """An onset in view of a manoeuvre comes at most so long before it, s."""
 DEFAULT_MANOEUVRE = 0.15
 
+RAMP_RATE = (0.2, 5.0)
+"""Least and largest of a ramp, m/s."""
+JUMP_SIZE = (5.0, 50.0)
+"""Least and largest of a jump, m."""
+GROWTH_SIZE = (10.0, 200.0)
+"""Least and largest of a growth, m."""
+GROWTH_TIME = (10.0, 80.0)
+"""Shortest and longest growth, s."""
+SLOW_RATE, FAST_RATE = (0.1, 0.8), (1.0, 6.0)
+"""Least and largest of the two stages of a ramp, m/s."""
+CHANGE_TIME = (15.0, 50.0)
+"""Earliest and latest change from the one to the other, s after the onset."""
+TURNING_RATE = (0.3, 3.0)
+"""Least and largest of a ramp that turns back, m/s."""
+TURNING_TIME = (10.0, 40.0)
+"""Earliest and latest turn, s after the onset."""
+DECAYING_SIZE = (10.0, 80.0)
+"""Least and largest of a jump that decays, m."""
+DECAY_TIME = (10.0, 40.0)
+"""Shortest and longest decay to 1 / e, s."""
+SPIRAL_RATE = (0.3, 3.0)
+"""Least and largest of a spiral, m/s."""
+SPIRAL_TURN = (-3.0, 3.0)
+"""Least and largest rate at which its heading turns, deg/s."""
+SPIRAL_CLIMB = (-1.0, 1.0)
+"""Least and largest rate at which the height leaves, m/s."""
+
 
 def spoofed_stretch(offsets: Floats) -> tuple[Runs, Runs]:
     """First and last epoch of episodes (n, K+1, 3) with an offset, (n,) each; K + 1 and 0 where there is none."""
@@ -163,7 +190,7 @@ class RandomRamp(AttackFamily):
     kind = "random-ramp"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        return _along(_log_between(draws[:, 0], 0.2, 5.0)[:, None] * since)
+        return _along(_log_between(draws[:, 0], *RAMP_RATE)[:, None] * since)
 
 
 class RandomJump(AttackFamily):
@@ -172,7 +199,7 @@ class RandomJump(AttackFamily):
     kind = "random-jump"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        return _along(np.broadcast_to(_between(draws[:, 0], 5.0, 50.0)[:, None], since.shape).copy())
+        return _along(np.broadcast_to(_between(draws[:, 0], *JUMP_SIZE)[:, None], since.shape).copy())
 
 
 class RandomGrowth(AttackFamily):
@@ -184,7 +211,7 @@ class RandomGrowth(AttackFamily):
     kind = "random-growth"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        size, growth = _log_between(draws[:, 0], 10.0, 200.0), _between(draws[:, 1], 10.0, 80.0)
+        size, growth = _log_between(draws[:, 0], *GROWTH_SIZE), _between(draws[:, 1], *GROWTH_TIME)
         x = np.minimum(since / growth[:, None], 1.0)
         return _along(size[:, None] * np.where(x < 0.5, 2.0 * x**2, 1.0 - 2.0 * (1.0 - x) ** 2))
 
@@ -195,8 +222,8 @@ class TwoStageRamp(AttackFamily):
     kind = "two-stage-ramp"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        slow, fast = _between(draws[:, 0], 0.1, 0.8)[:, None], _between(draws[:, 1], 1.0, 6.0)[:, None]
-        change = _between(draws[:, 2], 15.0, 50.0)[:, None]
+        slow, fast = _between(draws[:, 0], *SLOW_RATE)[:, None], _between(draws[:, 1], *FAST_RATE)[:, None]
+        change = _between(draws[:, 2], *CHANGE_TIME)[:, None]
         return _along(slow * np.minimum(since, change) + fast * np.maximum(since - change, 0.0))
 
 
@@ -206,7 +233,7 @@ class SignChangingRamp(AttackFamily):
     kind = "sign-changing-ramp"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        rate, turn = _between(draws[:, 0], 0.3, 3.0)[:, None], _between(draws[:, 1], 10.0, 40.0)[:, None]
+        rate, turn = _between(draws[:, 0], *TURNING_RATE)[:, None], _between(draws[:, 1], *TURNING_TIME)[:, None]
         return _along(rate * np.where(since < turn, since, 2.0 * turn - since))
 
 
@@ -216,7 +243,7 @@ class DecayingJump(AttackFamily):
     kind = "decaying-jump"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        size, time = _between(draws[:, 0], 10.0, 80.0)[:, None], _between(draws[:, 1], 10.0, 40.0)[:, None]
+        size, time = _between(draws[:, 0], *DECAYING_SIZE)[:, None], _between(draws[:, 1], *DECAY_TIME)[:, None]
         return _along(size * np.exp(-since / time))
 
 
@@ -226,9 +253,9 @@ class ClimbingSpiral(AttackFamily):
     kind = "climbing-spiral"
 
     def _shape(self, draws: Floats, since: Floats, duration: Floats) -> Floats:
-        rate = _log_between(draws[:, 0], 0.3, 3.0)[:, None]
-        turn = np.radians(_between(draws[:, 1], -3.0, 3.0))[:, None]
+        rate = _log_between(draws[:, 0], *SPIRAL_RATE)[:, None]
+        turn = np.radians(_between(draws[:, 1], *SPIRAL_TURN))[:, None]
         turn = np.where(np.abs(turn) < 1e-6, 1e-6, turn)
-        climb = _between(draws[:, 2], -1.0, 1.0)[:, None]
+        climb = _between(draws[:, 2], *SPIRAL_CLIMB)[:, None]
         along, right = rate * np.sin(turn * since) / turn, rate * (1.0 - np.cos(turn * since)) / turn
         return np.stack([along, right, climb * since], axis=2)

@@ -4,9 +4,11 @@ The way through this package: `survival` (what one epoch costs) · `play` (what 
 one place that computes it) · `response` (the linear maps behind it) · `closed_form`, `ramp`, `bounded` (three
 attackers) · `upper_bound` and `dynamic_programme` (what no attacker can exceed, from above and from below). Against
 other tests: `cumulative` (the sum of the statistics in a window) · `linear_tests` and `zero_alarm` (any set of tests
-that keep the signs of the innovations). Against every test: `gain` (what none of them can see).
+that keep the signs of the innovations). Against every test: `gain` (what none of them can see). For defenders: `bayes`
+(the least error against a known population of attacks).
 """
 
+from spoofgym.optimum.bayes import Bayesian
 from spoofgym.optimum.bounded import BoundedOptimum, bounded_optimum
 from spoofgym.optimum.closed_form import ClosedForm, best_budget, noncentrality_optimum
 from spoofgym.optimum.cumulative import cumulative_optimum, missed_magnitude
@@ -19,6 +21,7 @@ from spoofgym.optimum.upper_bound import UpperBound, upper_bound
 from spoofgym.optimum.zero_alarm import ZeroAlarm, zero_alarm
 
 __all__ = [
+    "Bayesian",
     "BestRamp",
     "BoundedOptimum",
     "ClosedForm",

@@ -46,6 +46,7 @@ class Confounders:
     Attributes:
         available: whether there is a fix at epochs 0..K, (N, K+1); always at epoch 0.
         multipath: whether a burst is in force, (N, K+1).
+        sigma: of its noise per axis, (N, K+1), m; 0 where there is none.
         noise: of the bursts, in the position of a fix, (N, K+1, 3), m.
     """
 
@@ -59,11 +60,13 @@ class Confounders:
         self._timeline = timeline
         self.available = np.ones((num_runs, epochs), dtype=bool)
         self.multipath = np.zeros((num_runs, epochs), dtype=bool)
+        self.sigma: Floats = np.zeros((num_runs, epochs))
         self.noise: Floats = np.zeros((num_runs, epochs, 3))
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Draw the disturbances of new episodes: blocks of a fixed size, whatever becomes of them."""
-        self.available[runs], self.multipath[runs], self.noise[runs] = True, False, 0.0
+        self.available[runs], self.multipath[runs] = True, False
+        self.sigma[runs], self.noise[runs] = 0.0, 0.0
         given = self.disturbances
         for run in runs.tolist():
             stream = streams(run, "confounders")
@@ -73,8 +76,9 @@ class Confounders:
             if draws[3] < given.multipath_share:
                 stretch = self._stretch(draws[4], draws[5], given.multipath_duration)
                 low, high = given.multipath_sigma
-                self.multipath[run, stretch] = True
-                self.noise[run, stretch] = (low + draws[6] * (high - low)) * normals[stretch]
+                sigma = low + draws[6] * (high - low)
+                self.multipath[run, stretch], self.sigma[run, stretch] = True, sigma
+                self.noise[run, stretch] = sigma * normals[stretch]
 
     def _stretch(self, place: float, length: float, duration: tuple[float, float]) -> slice:
         """Epochs of a disturbance that begins at any of them after epoch 0 and may last beyond the end."""
