@@ -70,4 +70,5 @@ def fit_response(owner: str, response: Response, scenario: Scenario, num_runs: i
     """
     validation.instance(owner, "response", response, Response, "a response, as make_response gives, or None")
     scenario.facts.require(f"response {response.name!r}", response.needs)
+    response.know(scenario.facts)
     response.bind(num_runs)

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from spoofgym.navigation.loose.mean_maps import error_map
 from spoofgym.optimum import game_gain
-from spoofgym.optimum.gain import error_map
 from spoofgym.optimum.response import error_response
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios import make_scenario

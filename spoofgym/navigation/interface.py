@@ -277,6 +277,17 @@ class Navigator(Protocol):
         """Gyro and accelerometer biases that the filter has estimated, (N, 6), rad/s and m/s²."""
 
 
+class FixNavigator(Navigator, Protocol):
+    """A navigator on fixes whose runs have covariances of their own."""
+
+    auxiliary: Floats
+    """The fifteen inertial states of the unaided solution minus those of the filter, (N, 15); (N, 0) undemanded."""
+
+    @property
+    def fix_gain(self) -> Floats:
+        """U' for the present fix, (N, m, 15): with the whitened innovation w the fix takes U w off the error."""
+
+
 class RangeNavigator(Navigator, Protocol):
     """A navigator on ranges, which shows monitors more of its filters."""
 
@@ -348,8 +359,13 @@ class FilterView:
         return self._on_ranges.shared_gains
 
     @cached_property
+    def fix_gain(self) -> Floats:
+        """U' for the present fix, (N, m, 15); of a filter on fixes whose runs have covariances of their own."""
+        return cast(FixNavigator, self._navigator).fix_gain[self._runs]
+
+    @cached_property
     def auxiliary(self) -> Floats:
-        """Inertial states of the unaided solution minus those of the filter, (N, 15); of a filter on ranges."""
+        """Inertial states of the unaided solution minus those of the filter, (N, 15); (N, 0) undemanded."""
         return self._on_ranges.auxiliary[self._runs]
 
     @cached_property

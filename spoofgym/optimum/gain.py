@@ -13,8 +13,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
-from spoofgym.navigation.loose.mean_maps import check_position_fix, offsets_of
-from spoofgym.optimum.play import HORIZONTAL
+from spoofgym.navigation.loose.mean_maps import check_position_fix, error_map, offsets_of
 
 
 @dataclass(frozen=True)
@@ -32,22 +31,6 @@ class GameGain:
     whitened: Floats
     offsets: Floats
     error: Floats
-
-
-def error_map(model: LinearModel) -> Floats:
-    """T: from the mean whitened innovations of epochs 1..K to the horizontal errors after them, (2K, K * m), m.
-
-    Args:
-        model: the filter along the scenario.
-    """
-    num_epochs, m = model.num_epochs, model.dimension
-    error = np.zeros((model.num_states, num_epochs * m))
-    rows = np.empty((num_epochs, 2, num_epochs * m))
-    for k in range(1, num_epochs + 1):
-        error[:, : k * m] = model.transition[k] @ error[:, : k * m]
-        error[:, (k - 1) * m : k * m] -= model.whitened_gain[k].T
-        rows[k - 1] = error[HORIZONTAL]
-    return rows.reshape(2 * num_epochs, num_epochs * m)
 
 
 def game_gain(model: LinearModel) -> GameGain:

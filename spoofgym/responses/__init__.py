@@ -10,6 +10,7 @@ from spoofgym.responses.base import Response
 from spoofgym.responses.constant_velocity import ConstantVelocityStart
 from spoofgym.responses.exclude import AlwaysExclude, AlwaysUse, Exclude, Latch
 from spoofgym.responses.exclude_satellites import ExcludeSatellites
+from spoofgym.responses.multiple_hypothesis import MultipleHypothesis
 from spoofgym.responses.onset_depth import OnsetDepth
 from spoofgym.responses.px4 import Px4Auto, Px4DeadReckoning
 from spoofgym.specification import build
@@ -23,6 +24,7 @@ RESPONSES: dict[str, Callable[..., Response]] = {
     "exclude-and-backtrack": ExcludeAndBacktrack,
     "constant-velocity-start": ConstantVelocityStart,
     "onset-depth": OnsetDepth,
+    "multiple-hypothesis": MultipleHypothesis,
     "px4-auto": Px4Auto,
     "px4-dead-reckoning": Px4DeadReckoning,
     "ardupilot-glitch": ArduPilotGlitch,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from spoofgym.arrays import Flags, Runs, take_runs
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Decision, Demands, Epoch
 from spoofgym.streams import RunStreams
 
@@ -36,6 +37,9 @@ class Response(ABC):
     @abstractmethod
     def name(self) -> str:
         """The specification that builds this response."""
+
+    def know(self, facts: FilterFacts) -> None:  # noqa: B027 - most responses need no facts
+        """Learn what is known of the filter before any epoch; before `bind`."""
 
     def bind(self, num_runs: int) -> None:
         """Allocate the memory of ``num_runs`` runs."""

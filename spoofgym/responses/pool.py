@@ -11,6 +11,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Runs
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Decision, Epoch
 from spoofgym.responses.base import Response
 from spoofgym.streams import RunStreams
@@ -49,6 +50,11 @@ class ResponsePool(Response):
     def name(self) -> str:
         """The names of the members."""
         return " + ".join(self.names)
+
+    def know(self, facts: FilterFacts) -> None:
+        """Tell every member what is known of the filter."""
+        for member in self._members:
+            member.know(facts)
 
     def bind(self, num_runs: int) -> None:
         """Allocate the memory of ``num_runs`` runs in every member."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from spoofgym.arrays import Flags, Runs
 from spoofgym.detectors.base import Detector, require_threshold
+from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.interface import Decision, Epoch
 from spoofgym.responses.base import Response
 from spoofgym.streams import RunStreams
@@ -40,6 +41,10 @@ class Watching(Response):
     def name(self) -> str:
         """Detector and response; no specification builds it."""
         return f"{self._detector} > {self._response.name}"
+
+    def know(self, facts: FilterFacts) -> None:
+        """Tell the response what is known of the filter."""
+        self._response.know(facts)
 
     def bind(self, num_runs: int) -> None:
         """Allocate the memory of ``num_runs`` runs, in a copy of the response."""

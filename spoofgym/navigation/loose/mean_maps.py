@@ -20,6 +20,9 @@ from spoofgym.arrays import Floats
 from spoofgym.navigation.error_model import NUM_NAVIGATION
 from spoofgym.navigation.linear_model import LinearModel
 
+HORIZONTAL = slice(6, 8)
+"""East and north of the position error."""
+
 
 def check_position_fix(model: LinearModel, owner: str) -> None:
     """Refuse a model whose fixes are not a position alone.
@@ -77,6 +80,40 @@ def expected_columns(model: LinearModel, deviations: Iterable[Floats], num_colum
         _whiten(model.innovation_factor[k], _observed(model, k, error) - deviation, whitened[k - 1])
         error = _corrected(model, k, error, whitened[k - 1])
     return whitened, error
+
+
+def error_map(model: LinearModel) -> Floats:
+    """T: from the mean whitened innovations of epochs 1..K to the horizontal errors after them, (2K, K * m), m.
+
+    Args:
+        model: the filter along the scenario.
+    """
+    num_epochs, m = model.num_epochs, model.dimension
+    error = np.zeros((model.num_states, num_epochs * m))
+    rows = np.empty((num_epochs, 2, num_epochs * m))
+    for k in range(1, num_epochs + 1):
+        error[:, : k * m] = model.transition[k] @ error[:, : k * m]
+        error[:, (k - 1) * m : k * m] -= model.whitened_gain[k].T
+        rows[k - 1] = error[HORIZONTAL]
+    return rows.reshape(2 * num_epochs, num_epochs * m)
+
+
+def quiet_offsets(model: LinearModel, directions: int) -> Floats:
+    """The offsets that move the position most over a game per unit of noncentrality.
+
+    Args:
+        model: the filter along the scenario.
+        directions: r, how many attacks; their innovations are orthogonal, the most effective first.
+
+    Returns:
+        Horizontal offsets of epochs 0..K with Σ|u_k|² = 1, none at epoch 0, (K+1, 2, r), m.
+
+    Raises:
+        ValueError: m is not 3.
+    """
+    _, _, right = np.linalg.svd(error_map(model), full_matrices=False)
+    offsets = [offsets_of(model, vector.reshape(-1, model.dimension))[:, :2] for vector in right[:directions]]
+    return np.concatenate([np.zeros((1, 2, directions)), np.stack(offsets, axis=2)])
 
 
 def final_response(model: LinearModel, rows: Floats, num_epochs: int) -> Floats:

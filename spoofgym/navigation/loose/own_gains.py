@@ -8,7 +8,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.kernels import njit
 from spoofgym.navigation import kalman
 from spoofgym.navigation.batch import InnovationArrays, Weights, empty_innovation
-from spoofgym.navigation.error_model import NUM_NAVIGATION, POSITION
+from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION, POSITION
 from spoofgym.navigation.history import History, Ring, keep
 from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.linear_model import LinearModel, LinearSteps
@@ -98,6 +98,11 @@ class OwnCovarianceNavigator(ErrorBatch):
     def position_covariance(self) -> Floats:
         """The filter's covariance of the position, (N, 3, 3), m²."""
         return self.covariance[:, POSITION, POSITION].copy()
+
+    @property
+    def fix_gain(self) -> Floats:
+        """U' for the fix of the present epoch, (N, m, 15)."""
+        return self._gain[:, :, :NUM_INERTIAL].copy()
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

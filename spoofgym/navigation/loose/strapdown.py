@@ -13,6 +13,7 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.batch import Weights, empty_innovation
 from spoofgym.navigation.divergence import blank
+from spoofgym.navigation.error_model import NUM_INERTIAL
 from spoofgym.navigation.history import History
 from spoofgym.navigation.interface import NO_DEMANDS, Demands, Innovation
 from spoofgym.navigation.loose import kernels
@@ -109,3 +110,8 @@ class StrapdownNavigator(InertialBatch):
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
         """Position and, where the receiver gives it, velocity jump to the fix; their correlations are forgotten."""
         kernels.reset(runs, variance, self._noise, self._inertial, self.covariance, self._residual[runs])
+
+    @property
+    def fix_gain(self) -> Floats:
+        """U' for the fix of the present epoch, (N, m, 15)."""
+        return self._gain[:, :, :NUM_INERTIAL].copy()
