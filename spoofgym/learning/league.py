@@ -27,8 +27,9 @@ from spoofgym.evaluation.engine import ENGINES, Engine, Here, make_engine
 from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import MORE_GAMES, League, LeagueSettings
-from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WORLD_DETECTORS, tuned_for
+from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WITHOUT_ALARM, WORLD_DETECTORS, tuned_for
 from spoofgym.program import do_all, give_json, program
+from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.league_presentation import league_figure, league_tables
@@ -97,7 +98,8 @@ def classical_defenders(scenario: Scenario) -> tuple[str, ...]:
     """Every classical defender that fits a scenario, and the yardsticks, as they are spelled."""
     listed = [*PUBLISHED, *tuned_for(scenario.name)]
     spelled = [f"{each.detector}{SEPARATOR}{each.response}" for each in listed if fits(each.detector, scenario)]
-    return (*dict.fromkeys(spelled), *YARDSTICKS)
+    alone = [name for name in WITHOUT_ALARM if set(make_response(name).needs) <= set(scenario.offers)]
+    return (*dict.fromkeys(spelled), *alone, *YARDSTICKS)
 
 
 def duel_of(options: argparse.Namespace) -> tuple[DuelConfig, tuple[str, ...]]:

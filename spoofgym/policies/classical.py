@@ -51,6 +51,9 @@ PUBLISHED = (
 )
 """The responses of the literature and of two autopilots, which follow their own gates instead of an alarm."""
 
+WITHOUT_ALARM = ("multiple-hypothesis",)
+"""Responses that follow no alarm, but weigh the innovations themselves."""
+
 GRID_DETECTORS = ("windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
 GRID_DEPTHS = (0, 10, 20, 50)
 GRID_REUSES = (0, 5, 12)

@@ -56,7 +56,7 @@ class MultipleHypothesis(Response):
 
     def __init__(
         self,
-        hypotheses: int = 24,
+        hypotheses: int = 12,
         history: int = 60,
         onset: float = 120.0,
         end: float = 60.0,
