@@ -171,21 +171,29 @@ def infer(model: LinearModel, pull: PullProcess, fixes: Floats) -> tuple[Floats,
     return means[:, 1:], variances[1:], np.cumsum(likelihood, axis=1)[:, 1:]
 
 
-def posterior(
-    model: LinearModel, truth: PullProcess, pulls: Sequence[PullProcess], games: int, rng: np.random.Generator
-) -> Posterior:
-    """Draw games of one pull and infer the error under each.
+def posteriors(
+    model: LinearModel, pulls: Sequence[PullProcess], games: int, rng: np.random.Generator
+) -> list[Posterior]:
+    """Draw games of every pull, and infer the error in each under every pull.
 
     Args:
         model: of the game.
-        truth: the pull of the games.
         pulls: the hypotheses, J.
-        games: N.
+        games: N, of each.
         rng: random numbers.
+
+    Returns:
+        What the games of each pull tell.
     """
-    fixes, errors, _ = draw_games(model, truth, games, rng)
+    drawn = [draw_games(model, pull, games, rng)[:2] for pull in pulls]
+    fixes = np.concatenate([fixes for fixes, _ in drawn])
     means, variances, likelihoods = zip(*[infer(model, pull, fixes) for pull in pulls], strict=True)
-    return Posterior(np.stack(means), np.stack(variances), np.stack(likelihoods), errors[:, 1:])
+    mean, variance, likelihood = np.stack(means), np.stack(variances), np.stack(likelihoods)
+    parts = [slice(place * games, (place + 1) * games) for place in range(len(pulls))]
+    return [
+        Posterior(mean[:, part], variance, likelihood[:, part], errors[:, 1:])
+        for part, (_, errors) in zip(parts, drawn, strict=True)
+    ]
 
 
 def best_estimate(found: Posterior, log_share: Floats, loss: Loss) -> Floats:
@@ -275,8 +283,8 @@ def lower_bound(
     games = validation.whole(OWNER, "games", games, 2)
     every = (no_pull(model), *pulls)
     rng = np.random.default_rng(validation.whole(OWNER, "seed", seed, 0))
-    shares = worst_shares([_thinned(posterior(model, pull, every, games, rng)) for pull in every], clean, loss)
-    costs = risks([posterior(model, pull, every, games, rng) for pull in every], shares, loss)
+    shares = worst_shares([_thinned(found) for found in posteriors(model, every, games, rng)], clean, loss)
+    costs = risks(posteriors(model, every, games, rng), shares, loss)
     mean = np.array([cost.mean() for cost in costs])
     deviation = np.array([cost.std(ddof=1) for cost in costs]) / np.sqrt(games)
     attacked = shares[1:] / shares[1:].sum()
