@@ -3,7 +3,7 @@
 Each has a specification:
 
 - ``ramp:0.5``, ``exclude``, ...: an attack or a response by its registered name;
-- ``unseen:BUDGET``: the optimal attack of `spoofgym.policies.unseen`;
+- ``unseen:BUDGET``, ``closed-form:BUDGET``: the optimal attacks of `spoofgym.policies.unseen` and `.furthest`;
 - ``policy:NAME`` or ``policy:FOLDER``: a learned policy, published or in a run folder;
 - ``DETECTOR > RESPONSE``: a response that follows the alarm of one of the game's detectors alone;
 - ``pool:A+B+C`` or ``pool:A+B+C,weights=2+1+1``: a pool, from which every run draws its opponent. Within it ``/``
@@ -28,6 +28,8 @@ from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
 from spoofgym.policies.classical import SEPARATOR
+from spoofgym.policies.furthest import NAME as CLOSED_FORM
+from spoofgym.policies.furthest import Furthest
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
 from spoofgym.policies.published import POLICY, policy_folder
 from spoofgym.policies.unseen import NAME as UNSEEN
@@ -40,7 +42,7 @@ from spoofgym.scenario import Scenario
 from spoofgym.specification import Specification, build, unnest
 
 POOL = "pool:"
-OPTIMAL: dict[str, Callable[..., Attack]] = {UNSEEN: Unseen}
+OPTIMAL: dict[str, Callable[..., Attack]] = {UNSEEN: Unseen, CLOSED_FORM: Furthest}
 """Optimal attacks, which stand below the registry of attacks."""
 Part = TypeVar("Part")
 

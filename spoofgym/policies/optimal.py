@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
+from spoofgym import validation
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
@@ -36,21 +37,44 @@ def oracles(scenario: Scenario, arl0: float) -> list[Attack]:
         scenario: of the games.
         arl0: of every monitor by itself, epochs.
     """
-    if not scenario.matched or scenario.dimension != 3:
+    if not has_oracles(scenario):
         return []
+    return [oracle(name, scenario, arl0) for name in ORACLES]
+
+
+def has_oracles(scenario: Scenario) -> bool:
+    """Whether optimal attacks against monitors are known there: a matched filter on fixes without velocity."""
+    return scenario.matched and scenario.dimension == 3
+
+
+def oracle(name: str, scenario: Scenario, arl0: float) -> Attack:
+    """One of the optimal attacks against monitors at an ARL₀.
+
+    Args:
+        name: one of `ORACLES`.
+        scenario: of the games.
+        arl0: of every monitor by itself, epochs.
+
+    Raises:
+        ValueError: an unknown name, or the scenario has none.
+    """
+    validation.one_of("optimal attack", "name", name, ORACLES)
+    if not has_oracles(scenario):
+        raise ValueError(
+            f"attack {name!r} needs a matched filter and fixes without velocity, scenario {scenario.name!r} has not "
+            "both"
+        )
     model, rates = scenario.linear_model(), np.array(scenario.drag_off_rate)
-    best = bounded_optimum(model, quantile(1.0 / arl0, 3), rates)
-    epochs = model.num_epochs
-    window, _ = cumulative_optimum(model, epochs, _threshold(f"windowed:n={epochs}", scenario, arl0), MISSED)
-    gates = gate(float(stats.norm.isf(1.0 / (6.0 * arl0))))
-    return [
-        OffsetSequence(BEST, best.outcome.offsets),
-        OffsetSequence(WORST, window.offsets),
-        OffsetSequence(GATE, zero_alarm(model, gates, drag_off_rate=rates).offsets),
-        OffsetSequence(
-            SIGNED, zero_alarm(model, [*gates, *signed_tests(scenario, arl0)], drag_off_rate=rates).offsets
-        ),
-    ]
+    if name == BEST:
+        return OffsetSequence(name, bounded_optimum(model, quantile(1.0 / arl0, 3), rates).outcome.offsets)
+    if name == WORST:
+        epochs = model.num_epochs
+        threshold = _threshold(f"windowed:n={epochs}", scenario, arl0)
+        return OffsetSequence(name, cumulative_optimum(model, epochs, threshold, MISSED)[0].offsets)
+    tests = gate(float(stats.norm.isf(1.0 / (6.0 * arl0))))
+    if name == SIGNED:
+        tests = [*tests, *signed_tests(scenario, arl0)]
+    return OffsetSequence(name, zero_alarm(model, tests, drag_off_rate=rates).offsets)
 
 
 def signed_tests(scenario: Scenario, arl0: float) -> list[LinearTest]:
