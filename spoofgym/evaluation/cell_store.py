@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,26 +17,29 @@ import numpy as np
 
 from spoofgym import files
 from spoofgym.archive import read_arrays
-from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.duels import Cell, play_cell
 from spoofgym.evaluation.engine import Engine, Notify, Task
 from spoofgym.policies.learned import load_policy
 from spoofgym.policies.published import POLICY, policy_folder
 
+Play = Callable[[Any, str, str, int, int], Cell]
+"""Plays games: the arguments of `play_cell`, the configuration of any kind of game first."""
+
 
 class CellStore:
-    """The cells of one duel, in a folder."""
+    """The cells of one game, in a folder."""
 
-    def __init__(self, folder: Path, config: DuelConfig, games: int, seed: int) -> None:
+    def __init__(self, folder: Path, config: Any, games: int, seed: int, play: Play = play_cell) -> None:
         """Keep cells in ``folder``.
 
         Args:
             folder: is made where there is none.
-            config: arguments of the duel, with the detectors of all players.
+            config: arguments of the game, a data class of plain values, with the detectors of all players.
             games: that each cell has at least.
             seed: of game 0 of each cell.
+            play: plays games of this configuration, by default those of a duel; a function of a module.
         """
-        self._folder, self._config, self._games, self._seed = folder, config, games, seed
+        self._folder, self._config, self._games, self._seed, self._play = folder, config, games, seed, play
 
     @property
     def games(self) -> int:
@@ -59,7 +62,7 @@ class CellStore:
         kept = self._read(path, spoofer, defender)
         there = 0 if kept is None else len(kept.harm)
         if kept is None or there < games:
-            played = play_cell(self._config, spoofer, defender, games - there, self._seed + there)
+            played = self._play(self._config, spoofer, defender, games - there, self._seed + there)
             kept = played if kept is None else kept.followed_by(played)
             packed = io.BytesIO()
             np.savez(packed, harm=kept.harm, clean=kept.clean)
@@ -78,6 +81,17 @@ class CellStore:
             ValueError: as `cell`.
             RuntimeError: a failure of the engine.
         """
+        engine.run(self.lacking(wanted), notify)
+
+    def lacking(self, wanted: Mapping[tuple[str, str], int]) -> list[Task]:
+        """A task for each cell that has fewer games than are wanted; it plays them and keeps them.
+
+        Args:
+            wanted: how many games each cell, a spoofer and a defender, is to have.
+
+        Raises:
+            ValueError: a file is damaged, or a policy cannot be read.
+        """
         tasks = []
         for (spoofer, defender), games in wanted.items():
             kept = self._read(self._path(spoofer, defender), spoofer, defender)
@@ -85,7 +99,7 @@ class CellStore:
             if there < games:
                 which = f", games {there} to {games - 1}" if there else ""
                 tasks.append(Task(f"{spoofer} against {defender}{which}", _keep, (self, spoofer, defender, games)))
-        engine.run(tasks, notify)
+        return tasks
 
     def matrix(
         self, spoofers: Sequence[str], defenders: Sequence[str], engine: Engine, notify: Notify
