@@ -19,7 +19,6 @@ from pathlib import Path
 
 from rich.table import Table
 
-from spoofgym import files
 from spoofgym.command_line import Parser, count, output
 from spoofgym.console import console, show
 from spoofgym.evaluation.agent_scores import agent_scores
@@ -27,6 +26,7 @@ from spoofgym.policies.card import Card, Score, read_card
 from spoofgym.policies.learned import load_policy
 from spoofgym.policies.published import policy_folder, published_names
 from spoofgym.program import FAILURE, program
+from spoofgym.studies.pages import put_table
 
 BEGIN, END = "<!-- the table of `python -m spoofgym.studies.agents --write` -->", "<!-- end of the table -->"
 COLUMNS = ("agent", "role", "scenario", "knows", "opponent", "score")
@@ -116,14 +116,8 @@ def write_table(page: Path, cards: Sequence[Card]) -> None:
         ValueError: the page lacks the marks.
         OSError: it cannot be written.
     """
-    text = page.read_text(encoding="utf-8")
-    if BEGIN not in text or END not in text:
-        raise ValueError(f"{page} has no place for the table: it needs the lines {BEGIN!r} and {END!r}")
     rows = [_row(card, score) for card in sorted(cards, key=lambda card: card.name) for score in card.scores]
-    escaped = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-    lines = [f"| {' | '.join(row)} |" for row in (COLUMNS, ["---"] * len(COLUMNS), *escaped)]
-    before, _, rest = text.partition(BEGIN)
-    files.write_text(page, f"{before}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{END}{rest.partition(END)[2]}")
+    put_table(page, BEGIN, END, COLUMNS, rows)
 
 
 if __name__ == "__main__":
