@@ -5,7 +5,8 @@ one place that computes it) · `response` (the linear maps behind it) · `closed
 attackers) · `upper_bound` and `dynamic_programme` (what no attacker can exceed, from above and from below). Against
 other tests: `cumulative` (the sum of the statistics in a window) · `linear_tests` and `zero_alarm` (any set of tests
 that keep the signs of the innovations). Against every test: `gain` (what none of them can see). For defenders: `bayes`
-(the least error against a known population of attacks).
+(the least error against a known population of attacks), `gaussian_spoofer` with `pull_process` (what none of them can
+stay below in the duel).
 """
 
 from spoofgym.optimum.bayes import Bayesian
@@ -14,6 +15,7 @@ from spoofgym.optimum.closed_form import ClosedForm, best_budget, noncentrality_
 from spoofgym.optimum.cumulative import cumulative_optimum, missed_magnitude
 from spoofgym.optimum.dynamic_programme import Lattice, dynamic_programme
 from spoofgym.optimum.gain import GameGain, game_gain
+from spoofgym.optimum.gaussian_spoofer import LowerBound, lower_bound
 from spoofgym.optimum.linear_tests import LinearTest, ewma, gate, window_mean
 from spoofgym.optimum.play import Outcome, expected_play
 from spoofgym.optimum.ramp import BestRamp, best_ramp
@@ -28,6 +30,7 @@ __all__ = [
     "GameGain",
     "Lattice",
     "LinearTest",
+    "LowerBound",
     "Outcome",
     "UpperBound",
     "ZeroAlarm",
@@ -40,6 +43,7 @@ __all__ = [
     "expected_play",
     "game_gain",
     "gate",
+    "lower_bound",
     "missed_magnitude",
     "noncentrality_optimum",
     "upper_bound",

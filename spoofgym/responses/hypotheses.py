@@ -8,6 +8,7 @@ is another one: a mixture of the two attacks that move the position most per uni
 - a hypothesis without a pull may begin one, of each of several kinds, with a small probability;
 - a hypothesis with a pull may end it: the pull becomes zero, and what was inferred of the errors stays;
 - or the pull may turn to a rate that is unknown again;
+- multipath may begin or end, which adds noise to the fixes;
 - every hypothesis is weighted by the likelihood of the fix, and the heaviest are kept.
 
 This is multiple-hypothesis tracking (Reid 2179; Blackman 2004) of a spoofer instead of a target. The unaided solution
@@ -53,6 +54,8 @@ class PullKinds(NamedTuple):
         end: logarithm of the probability that a pull ends in an epoch, (T,).
         turn: logarithm of the probability that it turns to a rate that is unknown again, (T,).
         last: logarithm of the probability that it goes on, (T,).
+        disturbance: logarithms of the probabilities that multipath begins in an epoch, and that it ends, (2,).
+        undisturbed: logarithms of the probabilities that it does not begin, and that it does not end, (2,).
     """
 
     offset: Floats
@@ -65,6 +68,8 @@ class PullKinds(NamedTuple):
     end: Floats
     turn: Floats
     last: Floats
+    disturbance: Floats
+    undisturbed: Floats
 
 
 class BankModel(NamedTuple):
@@ -74,7 +79,7 @@ class BankModel(NamedTuple):
         transition: Φ of the inertial errors, (K+1, 15, 15).
         process_noise: Q by kind of hypothesis, clean first, (K+1, T+1, 21, 21).
         observation: H on all states by kind of hypothesis, clean first, (K+1, T+1, m, 21).
-        noise: R, (m, m).
+        noise: R without and with multipath, (2, m, m).
         interval: between epochs, s.
     """
 
@@ -93,15 +98,17 @@ class Bank(NamedTuple):
         covariance: of the states, (N, M, 21, 21).
         log_weight: logarithm of the posterior probability, (N, M); -inf where a place is empty.
         kind: of the pull, (N, M); -1 = there is none.
+        disturbed: 1 where multipath disturbs the fixes, else 0, (N, M).
     """
 
     mean: Floats
     covariance: Floats
     log_weight: Floats
     kind: Runs
+    disturbed: Runs
 
 
-def bank_model(model: LinearModel, kinds: PullKinds) -> BankModel:
+def bank_model(model: LinearModel, kinds: PullKinds, multipath: float) -> BankModel:
     """The filter of the hypotheses on a game.
 
     The states of a hidden pull, the last kind, are the amplitudes of the two attacks of `quiet_offsets`, which stand
@@ -110,6 +117,7 @@ def bank_model(model: LinearModel, kinds: PullKinds) -> BankModel:
     Args:
         model: the linear model of the game.
         kinds: of the pulls.
+        multipath: 1 sigma that it adds to each axis of the position, m.
 
     Raises:
         ValueError: pulls may be hidden, and the fixes are not a position alone.
@@ -132,7 +140,9 @@ def bank_model(model: LinearModel, kinds: PullKinds) -> BankModel:
     if kinds.hidden > 0.0:
         observation[:, -1, :2, OFFSET:RATE] = -quiet_offsets(model, 2)
     transition = np.ascontiguousarray(model.transition)
-    return BankModel(transition, process_noise, observation, model.measurement_covariance, interval)
+    calm = model.measurement_covariance
+    noise = np.stack([calm, calm + multipath**2 * np.diag(np.arange(m) < 3)])
+    return BankModel(transition, process_noise, observation, noise, interval)
 
 
 def empty_bank(num_runs: int, hypotheses: int) -> Bank:
@@ -142,6 +152,7 @@ def empty_bank(num_runs: int, hypotheses: int) -> Bank:
         np.zeros((num_runs, hypotheses, NUM_STATES, NUM_STATES)),
         np.full((num_runs, hypotheses), -np.inf),
         np.full((num_runs, hypotheses), CLEAN),
+        np.zeros((num_runs, hypotheses), dtype=np.int64),
     )
 
 
@@ -167,6 +178,7 @@ def start(bank: Bank, runs: Runs, prior_covariance: Floats, kinds: PullKinds) ->
         bank.log_weight[runs, 1] = np.log(kinds.hidden)
     bank.kind[runs] = CLEAN
     bank.kind[runs, 1] = hidden
+    bank.disturbed[runs] = 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -26,6 +26,8 @@ STAY = -2
 """A branch on which a hypothesis goes on as it is; else a branch is the kind of the pull from now on."""
 TURN = -3
 """A branch on which the pull of a hypothesis turns."""
+TOGGLE = -4
+"""A branch on which multipath begins or ends."""
 
 
 class Branches(NamedTuple):
@@ -33,7 +35,7 @@ class Branches(NamedTuple):
 
     Attributes:
         parent: index of the hypothesis, (B,).
-        way: `STAY`, `TURN`, `CLEAN` where a pull ends, or the kind of the pull that begins, (B,).
+        way: `STAY`, `TURN`, `TOGGLE`, `CLEAN` where a pull ends, or the kind of the pull that begins, (B,).
         log_weight: (B,).
     """
 
@@ -46,7 +48,7 @@ class Scratch(NamedTuple):
     """Work arrays of one run.
 
     Attributes:
-        mean, covariance, kind: of the new hypotheses, (M, 21), (M, 21, 21), (M,).
+        mean, covariance, kind, disturbed: of the new hypotheses, (M, 21), (M, 21, 21), (M,), (M,).
         trial_mean, trial: of one branch, (21,), (21, 21).
         work: (9, 21).
         cross, innovation, factor, gain: (m, 21), (m, m), (m, m), (m, 21).
@@ -56,6 +58,7 @@ class Scratch(NamedTuple):
     mean: Floats
     covariance: Floats
     kind: Runs
+    disturbed: Runs
     trial_mean: Floats
     trial: Floats
     work: Floats
@@ -72,6 +75,7 @@ def _scratch(hypotheses: int, m: int) -> Scratch:
     return Scratch(
         np.empty((hypotheses, NUM_STATES)),
         np.empty((hypotheses, NUM_STATES, NUM_STATES)),
+        np.empty(hypotheses, dtype=np.int64),
         np.empty(hypotheses, dtype=np.int64),
         np.empty(NUM_STATES),
         np.empty((NUM_STATES, NUM_STATES)),
@@ -94,18 +98,21 @@ def _copy(mean: Floats, covariance: Floats, to_mean: Floats, to_covariance: Floa
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _weigh(epoch: int, kind: int, fix: Floats, model: BankModel, scratch: Scratch) -> float:
+def _weigh(epoch: int, kind: int, disturbed: int, fix: Floats, model: BankModel, scratch: Scratch) -> float:
     """Logarithm of the likelihood of a fix under the scratch's trial; leaves its innovation in the scratch.
 
     Args:
         epoch: of the fix.
         kind: of the pull.
+        disturbed: 1 = by multipath.
         fix: the unaided solution minus the fix, (m,), m (and m/s).
         model: the filter.
         scratch: holds the trial; work arrays.
     """
     observation, m = model.observation[epoch, kind + 1], len(fix)
-    kalman.innovation_covariance(scratch.trial, observation, model.noise, scratch.cross, scratch.innovation)
+    kalman.innovation_covariance(
+        scratch.trial, observation, model.noise[disturbed], scratch.cross, scratch.innovation
+    )
     kalman.cholesky(scratch.innovation, scratch.factor)
     log_root = 0.0
     for a in range(m):
@@ -120,8 +127,10 @@ def _weigh(epoch: int, kind: int, fix: Floats, model: BankModel, scratch: Scratc
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _branch(parent: int, way: int, bank: Bank, run: int, kinds: PullKinds, scratch: Scratch) -> int:
-    """The state of a branch before the fix, in the scratch's trial, and the kind of its pull."""
+def _branch(
+    parent: int, way: int, bank: Bank, run: int, kinds: PullKinds, scratch: Scratch
+) -> tuple[int, int]:
+    """The state of a branch before the fix, in the trial; the kind of its pull, and whether it is disturbed."""
     _copy(bank.mean[run, parent], bank.covariance[run, parent], scratch.trial_mean, scratch.trial)
     if way >= 0:
         begin_pull(way, kinds, scratch.trial)
@@ -129,7 +138,8 @@ def _branch(parent: int, way: int, bank: Bank, run: int, kinds: PullKinds, scrat
         end_pull(scratch.trial_mean, scratch.trial)
     elif way == TURN:
         turn_pull(kinds, scratch.trial)
-    return way if way >= CLEAN else bank.kind[run, parent]
+    disturbed = bank.disturbed[run, parent]
+    return way if way >= CLEAN else bank.kind[run, parent], 1 - disturbed if way == TOGGLE else disturbed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -139,24 +149,26 @@ def _add(branches: Branches, count: int, parent: int, way: int, log_weight: floa
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _branch_all(log_weight: Floats, kind: Runs, kinds: PullKinds, branches: Branches) -> int:
+def _branch_all(log_weight: Floats, kind: Runs, disturbed: Runs, kinds: PullKinds, branches: Branches) -> int:
     """Every way on, with its prior weight; how many there are."""
     count = 0
     for h in range(len(log_weight)):
         if log_weight[h] == -np.inf:
             continue
+        count = _add(branches, count, h, TOGGLE, log_weight[h] + kinds.disturbance[disturbed[h]])
+        calm = log_weight[h] + kinds.undisturbed[disturbed[h]]
         if kind[h] == CLEAN:
-            count = _add(branches, count, h, STAY, log_weight[h] + kinds.none)
+            count = _add(branches, count, h, STAY, calm + kinds.none)
             for way in range(len(kinds.begin)):
                 if kinds.begin[way] == -np.inf:
                     continue
-                count = _add(branches, count, h, way, log_weight[h] + kinds.begin[way])
+                count = _add(branches, count, h, way, calm + kinds.begin[way])
         else:
             pull = kind[h]
-            count = _add(branches, count, h, STAY, log_weight[h] + kinds.last[pull])
+            count = _add(branches, count, h, STAY, calm + kinds.last[pull])
             if kinds.end[pull] > -np.inf:
-                count = _add(branches, count, h, CLEAN, log_weight[h] + kinds.end[pull])
-                count = _add(branches, count, h, TURN, log_weight[h] + kinds.turn[pull])
+                count = _add(branches, count, h, CLEAN, calm + kinds.end[pull])
+                count = _add(branches, count, h, TURN, calm + kinds.turn[pull])
     return count
 
 
@@ -191,7 +203,7 @@ def advance(
     """
     hypotheses = bank.log_weight.shape[1]
     scratch = _scratch(hypotheses, fixes.shape[1])
-    room = hypotheses * (len(kinds.begin) + 3)
+    room = hypotheses * (len(kinds.begin) + 4)
     branches = Branches(np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64), np.empty(room))
     for run in runs:
         epoch, mean, covariance = index[run], bank.mean[run], bank.covariance[run]
@@ -201,23 +213,23 @@ def advance(
                 predict(kind[h], epoch, model, mean[h], covariance[h], scratch.work)
         if not available[run]:
             continue
-        count = _branch_all(log_weight, kind, kinds, branches)
+        count = _branch_all(log_weight, kind, bank.disturbed[run], kinds, branches)
         for b in range(count):
-            now = _branch(branches.parent[b], branches.way[b], bank, run, kinds, scratch)
-            branches.log_weight[b] += _weigh(epoch, now, fixes[run], model, scratch)
+            now, disturbed = _branch(branches.parent[b], branches.way[b], bank, run, kinds, scratch)
+            branches.log_weight[b] += _weigh(epoch, now, disturbed, fixes[run], model, scratch)
         order = np.argsort(-branches.log_weight[:count])
         kept = min(count, hypotheses)
         for place in range(kept):
             b = order[place]
-            now = _branch(branches.parent[b], branches.way[b], bank, run, kinds, scratch)
-            _weigh(epoch, now, fixes[run], model, scratch)
+            now, disturbed = _branch(branches.parent[b], branches.way[b], bank, run, kinds, scratch)
+            _weigh(epoch, now, disturbed, fixes[run], model, scratch)
             kalman.whitened_gain(scratch.cross, scratch.factor, scratch.gain)
             kalman.correct_error(scratch.gain, scratch.whitened, scratch.trial_mean)
             kalman.update_covariance(scratch.gain, scratch.trial)
             _copy(scratch.trial_mean, scratch.trial, scratch.mean[place], scratch.covariance[place])
-            scratch.kind[place] = now
+            scratch.kind[place], scratch.disturbed[place] = now, disturbed
             log_weight[place] = branches.log_weight[b]
         for place in range(kept):
             _copy(scratch.mean[place], scratch.covariance[place], mean[place], covariance[place])
-            kind[place] = scratch.kind[place]
+            kind[place], bank.disturbed[run, place] = scratch.kind[place], scratch.disturbed[place]
         _normalise(log_weight, kept)

@@ -18,6 +18,8 @@ from spoofgym.responses.solutions import Choice, Solutions, carry_past, choose, 
 from spoofgym.specification import spell
 
 KIND = "multiple-hypothesis"
+MULTIPATH = (600.0, 15.0)
+"""Mean time until a burst of multipath begins, and mean length of it, s."""
 
 
 class MultipleHypothesis(Response):
@@ -43,6 +45,7 @@ class MultipleHypothesis(Response):
         jump: 1 sigma of the offset with which a fast pull begins, per axis, m.
         curve: 1 sigma of the acceleration, per axis, as a share of that of the rate, 1/s.
         walk: 1 sigma by which the rate changes in a second, per axis, as a share of its own sigma.
+        multipath: 1 sigma that it adds to each axis of a fix, m; a burst comes every 600 s and lasts 15 s, on average.
         hidden: probability that a hidden pull has begun with the game: a mixture of the attacks that move the position
             most per unit of noncentrality (`quiet_offsets`), which look like inertial drift.
         amplitude: 1 sigma of its two amplitudes, the roots of their noncentralities.
@@ -66,8 +69,9 @@ class MultipleHypothesis(Response):
         fast: float = 2.5,
         jump: float = 20.0,
         curve: float = 0.05,
-        walk: float = 0.02,
-        hidden: float = 0.2,
+        walk: float = 0.1,
+        multipath: float = 6.0,
+        hidden: float = 0.1,
         amplitude: float = 4.0,
     ) -> None:
         self.hypotheses = validation.epochs(KIND, "hypotheses", hypotheses, 2)
@@ -81,6 +85,7 @@ class MultipleHypothesis(Response):
         self.jump = validation.non_negative(KIND, "jump", jump)
         self.curve = validation.non_negative(KIND, "curve", curve)
         self.walk = validation.non_negative(KIND, "walk", walk)
+        self.multipath = validation.non_negative(KIND, "multipath", multipath)
         self.hidden = validation.share(KIND, "hidden", hidden)
         self.amplitude = validation.above(KIND, "amplitude", amplitude)
         self.demands = Demands(excludes=True, history=self.history, auxiliary=True)
@@ -101,7 +106,7 @@ class MultipleHypothesis(Response):
         """
         model, interval = facts.model(0), facts.interval
         self._kinds = self._pulls(interval)
-        self._model = bank_model(model, self._kinds)
+        self._model = bank_model(model, self._kinds, self.multipath)
         self._prior = model.prior_covariance
         self._rows = look_ahead(model, round(self.ahead / interval))
 
@@ -110,6 +115,7 @@ class MultipleHypothesis(Response):
             if mean <= 2.0 * interval:
                 raise ValueError(f"{KIND}: {name} must be longer than two epochs of {interval:g} s, got {mean:g}")
         begins, ends, turns = interval / self.onset, interval / self.end, interval / self.turn
+        toggles = np.minimum(interval / np.array(MULTIPATH), 0.5)
         rate = np.array([self.slow, self.fast])
         return PullKinds(
             offset=np.array([0.0, self.jump, self.amplitude]),
@@ -122,13 +128,15 @@ class MultipleHypothesis(Response):
             end=np.array([np.log(ends), np.log(ends), -np.inf]),
             turn=np.array([np.log(turns), np.log(turns), -np.inf]),
             last=np.array([np.log1p(-ends - turns), np.log1p(-ends - turns), 0.0]),
+            disturbance=np.log(toggles),
+            undisturbed=np.log1p(-toggles),
         )
 
     def bind(self, num_runs: int) -> None:
         """Allocate the hypotheses and solutions of ``num_runs`` runs."""
         super().bind(num_runs)
         bank = empty_bank(num_runs, self.hypotheses)
-        self._mean, self._covariance, self._log_weight, self._pull = bank
+        self._mean, self._covariance, self._log_weight, self._pull, self._disturbed = bank
         self._bank = bank
         self._past = np.zeros((num_runs, self.history + 1, NUM_INERTIAL))
 

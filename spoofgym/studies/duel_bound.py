@@ -27,7 +27,7 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.specification import build
 
 DRIFTS = (1.5, 2.0, 3.0, 4.0)
-UNSEEN = (2.0, 3.0, 4.0, 6.0)
+UNSEEN = (2.0, 3.0, 4.0, 6.0, 9.0)
 Z95 = 1.96
 
 

@@ -8,7 +8,7 @@ from scipy import special, stats
 
 from spoofgym.navigation.loose.mean_maps import quiet_offsets
 from spoofgym.responses.hypotheses import CLEAN, NUM_STATES, OFFSET, PullKinds, bank_model, empty_bank, start
-from spoofgym.responses.hypothesis_step import STAY, TURN, advance
+from spoofgym.responses.hypothesis_step import STAY, TOGGLE, TURN, advance
 from spoofgym.scenarios import make_scenario
 
 EPOCHS = 3
@@ -23,7 +23,10 @@ KINDS = PullKinds(
     end=np.array([np.log(0.2), np.log(0.2), -np.inf]),
     turn=np.array([np.log(0.1), np.log(0.1), -np.inf]),
     last=np.array([np.log(0.7), np.log(0.7), 0.0]),
+    disturbance=np.log([0.1, 0.3]),
+    undisturbed=np.log([0.9, 0.7]),
 )
+MULTIPATH = 5.0
 HIDDEN = 2
 
 
@@ -34,11 +37,14 @@ def model():
 
 def histories(kind):
     """Every sequence of ways from a kind of hypothesis: (ways, kinds after each, logarithm of the prior)."""
-    ways = [STAY, CLEAN, TURN, 0, 1]
+    ways = [STAY, CLEAN, TURN, TOGGLE, 0, 1]
     for chosen in itertools.product(ways, repeat=EPOCHS):
-        now, kinds, log_prior = kind, [], 0.0
+        now, kinds, log_prior, disturbed = kind, [], 0.0, 0
         for way in chosen:
-            if now == CLEAN and way in (STAY, 0, 1):
+            log_prior += (KINDS.disturbance if way == TOGGLE else KINDS.undisturbed)[disturbed]
+            if way == TOGGLE:
+                disturbed = 1 - disturbed
+            elif now == CLEAN and way in (STAY, 0, 1):
                 log_prior += KINDS.none if way == STAY else KINDS.begin[way]
             elif now in (0, 1) and way in (STAY, CLEAN, TURN):
                 log_prior += {STAY: KINDS.last, CLEAN: KINDS.end, TURN: KINDS.turn}[way][now]
@@ -46,7 +52,7 @@ def histories(kind):
                 log_prior += 0.0
             else:
                 break
-            now = now if way in (STAY, TURN) else way
+            now = now if way in (STAY, TURN, TOGGLE) else way
             kinds.append(now)
         else:
             yield chosen, kinds, log_prior
@@ -93,12 +99,12 @@ def pull_variance(kind):
 
 def explained(model, kind, ways, kinds, fixes):
     """A history's density of the fixes, and the state after them."""
-    filter_model = bank_model(model, KINDS)
+    filter_model = bank_model(model, KINDS, MULTIPATH)
     start_covariance = np.zeros((NUM_STATES, NUM_STATES))
     start_covariance[:15, :15] = model.prior_covariance
     joint = Joint(start_covariance + np.diag(pull_variance(kind) if kind == HIDDEN else np.zeros(NUM_STATES)))
     t = filter_model.interval
-    before = kind
+    before, disturbed = kind, False
     for k, (way, now) in enumerate(zip(ways, kinds, strict=True)):
         transition = np.zeros((NUM_STATES, NUM_STATES))
         transition[:15, :15] = model.transition[k]
@@ -116,7 +122,8 @@ def explained(model, kind, ways, kinds, fixes):
         observation = np.zeros((3, NUM_STATES))
         observation[:, :9] = model.observation[k]
         observation[:2, OFFSET : OFFSET + 2] = -quiet_offsets(model, 2)[k] if now == HIDDEN else -np.eye(2)
-        joint.see(observation, model.measurement_covariance)
+        disturbed ^= way == TOGGLE
+        joint.see(observation, model.measurement_covariance + disturbed * MULTIPATH**2 * np.eye(3))
         before = now
     return joint.density(fixes)
 
@@ -131,7 +138,7 @@ def test_posterior_is_that_of_every_history_of_a_short_game(model):
             expected.append((prior + log_prior + log_density, kinds[-1], mean, covariance))
     bank = empty_bank(1, 2 * len(expected))
     start(bank, np.array([0]), model.prior_covariance, KINDS)
-    filter_model = bank_model(model, KINDS)
+    filter_model = bank_model(model, KINDS, MULTIPATH)
     for k in range(EPOCHS):
         advance(np.array([0]), np.array([k]), fixes[k][None], np.array([True]), filter_model, KINDS, bank)
     log_weight = np.array([item[0] for item in expected])
@@ -147,8 +154,8 @@ def test_posterior_is_that_of_every_history_of_a_short_game(model):
 
 
 def test_without_pulls_it_is_the_filter_that_uses_every_fix(model):
-    never = KINDS._replace(begin=np.full(3, -np.inf), none=0.0, hidden=0.0)
-    bank, filter_model = empty_bank(1, 2), bank_model(model, never)
+    never = KINDS._replace(begin=np.full(3, -np.inf), none=0.0, hidden=0.0, disturbance=np.full(2, -np.inf))
+    bank, filter_model = empty_bank(1, 2), bank_model(model, never, MULTIPATH)
     start(bank, np.array([0]), model.prior_covariance, never)
     mean, rng = np.zeros(15), np.random.default_rng(1)
     for k in range(40):
@@ -165,7 +172,7 @@ def test_without_pulls_it_is_the_filter_that_uses_every_fix(model):
 
 
 def test_an_epoch_without_a_fix_teaches_nothing(model):
-    bank, filter_model = empty_bank(1, 8), bank_model(model, KINDS)
+    bank, filter_model = empty_bank(1, 8), bank_model(model, KINDS, MULTIPATH)
     start(bank, np.array([0]), model.prior_covariance, KINDS)
     before = bank.log_weight.copy()
     advance(np.array([0]), np.array([0]), np.full((1, 3), 99.0), np.array([False]), filter_model, KINDS, bank)
@@ -176,7 +183,7 @@ def test_an_epoch_without_a_fix_teaches_nothing(model):
 def test_the_heaviest_hypotheses_are_kept(model):
     rng = np.random.default_rng(2)
     few, many = empty_bank(1, 3), empty_bank(1, 400)
-    filter_model = bank_model(model, KINDS)
+    filter_model = bank_model(model, KINDS, MULTIPATH)
     for bank in (few, many):
         start(bank, np.array([0]), model.prior_covariance, KINDS)
     fix = rng.normal(0.0, 1.0, (1, 3))
