@@ -54,7 +54,7 @@ class ClippedError(Payoff):
 
 
 class Beyond(Payoff):
-    """Whether the error exceeds ``limit``: the harm is a share of epochs."""
+    """Whether the error exceeds ``limit``, m: the harm is a share of epochs."""
 
     unit = "share of epochs"
     largest = 1.0
@@ -65,12 +65,12 @@ class Beyond(Payoff):
         Raises:
             ValueError: it is negative, or too large.
         """
-        self._limit = validation.non_negative("payoff beyond", "limit", limit, LARGEST_LIMIT)
-        self.name = spell("beyond", self._limit)
+        self.limit = validation.non_negative("payoff beyond", "limit", limit, LARGEST_LIMIT)
+        self.name = spell("beyond", self.limit)
 
     def of(self, error: Floats) -> Floats:
         """1 where the error exceeds the limit, else 0, (N,)."""
-        return np.where(error > self._limit, 1.0, 0.0)
+        return np.where(error > self.limit, 1.0, 0.0)
 
 
 def make_payoff(specification: str, scenario: Scenario) -> Payoff:

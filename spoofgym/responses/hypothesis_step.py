@@ -119,7 +119,7 @@ def _weigh(epoch: int, kind: int, disturbed: int, fix: Floats, model: BankModel,
         predicted = 0.0
         for j in range(NUM_STATES):
             predicted += observation[a, j] * scratch.trial_mean[j]
-        # of an error x the filter expects the residual H x; whitened is the innovation with the sign of `correct_error`
+        # `correct_error` subtracts, so the residual is what the hypothesis expects minus the fix
         scratch.residual[a] = predicted - fix[a]
         log_root += np.log(scratch.factor[a, a])
     nis = kalman.whiten(scratch.factor, scratch.residual, scratch.whitened)

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rich.table import Table
 
-from spoofgym import validation
 from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, count, share
 from spoofgym.console import console, show
+from spoofgym.envs.payoffs import Beyond, make_payoff
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.gaussian_spoofer import Loss, LowerBound, beyond_loss, error_loss, lower_bound
@@ -24,7 +24,6 @@ from spoofgym.optimum.pull_process import drift_pull, unseen_pull
 from spoofgym.program import do_all, give_json, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.specification import build
 
 DRIFTS = (1.5, 2.0, 3.0, 4.0)
 UNSEEN = (2.0, 3.0, 4.0, 6.0, 9.0)
@@ -55,15 +54,8 @@ def loss_of(payoff: str, scenario: Scenario) -> Loss:
     Raises:
         ValueError: it is unknown, or its number is out of range.
     """
-
-    def error(cap: float = scenario.harm_cap) -> Loss:
-        return error_loss(validation.above("payoff error", "cap", cap))
-
-    def beyond(limit: float) -> Loss:
-        return beyond_loss(validation.above("payoff beyond", "limit", limit))
-
-    registry: dict[str, Callable[..., Loss]] = {"error": error, "beyond": beyond}
-    return build(payoff, registry, "payoff")
+    made = make_payoff(payoff, scenario)
+    return beyond_loss(made.limit) if isinstance(made, Beyond) else error_loss(made.largest)
 
 
 def bounds(
