@@ -29,7 +29,7 @@ from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, d
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import defenders_report
 from spoofgym.policies.classical import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
-from spoofgym.policies.learned import LearnedDefender
+from spoofgym.policies.learned import LearnedDefender, LearnedPolicy
 from spoofgym.scenario import Scenario
 
 POPULATIONS = {"training": False, "held-out": True}
@@ -94,7 +94,7 @@ def _watched(policy: LearnedDefender) -> tuple[str | Detector, ...]:
     return detectors if isinstance(detectors, tuple) else (detectors,)
 
 
-def check_names(policies: Sequence[LearnedDefender]) -> None:
+def check_names(policies: Sequence[LearnedPolicy]) -> None:
     """Refuse policies that a report could not tell apart.
 
     Raises:

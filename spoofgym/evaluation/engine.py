@@ -7,7 +7,10 @@ again; a task that fails is named when all others have come to their ends.
 
 from __future__ import annotations
 
+import logging
 import os
+import re
+import socket
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -21,6 +24,8 @@ OWNER = "engine"
 TRIES = 3
 """How often a task is begun whose worker dies."""
 MOST_WORKERS = 1024
+PATIENCE = 10.0
+"""For the head of a cluster to take a connection, s."""
 ENGINES = ("processes", "ray")
 Notify = Callable[[str], None]
 
@@ -77,7 +82,7 @@ class Here:
 
 
 class Processes:
-    """Computes tasks in processes of this machine."""
+    """Computes tasks in processes of this machine, which stay for the next tasks: to begin one takes seconds."""
 
     def __init__(self, workers: int) -> None:
         """Use so many processes.
@@ -86,6 +91,7 @@ class Processes:
             ValueError: no worker, or too many.
         """
         self._workers = validation.whole(OWNER, "workers", workers, 1, MOST_WORKERS)
+        self._pool: ProcessPoolExecutor | None = None
 
     def run(self, tasks: Sequence[Task], notify: Notify) -> list[Any]:
         """The results of tasks, in their order; as `Engine.run`."""
@@ -106,9 +112,9 @@ class Processes:
     def _try(
         self, tasks: list[tuple[int, Task]], results: dict[int, Any], failures: list[tuple[Task, Exception]]
     ) -> list[int]:
-        """Compute tasks in fresh processes; the places of those whose worker died, or never took them."""
-        lost = []
-        pool = ProcessPoolExecutor(min(self._workers, len(tasks)), mp_context=get_context("spawn"))
+        """Compute tasks; the places of those whose worker died, or never took them."""
+        lost, whole = [], False
+        pool = self._pool or ProcessPoolExecutor(self._workers, mp_context=get_context("spawn"))
         try:
             begun: list[tuple[int, Task, Future[Any]]] = []
             for place, task in tasks:
@@ -123,8 +129,11 @@ class Processes:
                     lost.append(place)
                 except Exception as error:
                     failures.append((task, error))
+            whole = not lost
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = pool if whole else None
+            if not whole:
+                pool.shutdown(wait=True, cancel_futures=True)
         return lost
 
 
@@ -147,7 +156,14 @@ class Ray:
             raise ImportError("the engine 'ray' needs Ray: pip install 'spoofgym[ray]'") from error
         self._ray = ray
         try:
-            ray.init(address=address, ignore_reinit_error=True, include_dashboard=False, log_to_driver=False)
+            _knock(address)
+            ray.init(
+                address=address,
+                ignore_reinit_error=True,
+                include_dashboard=False,
+                log_to_driver=False,
+                logging_level=logging.ERROR,
+            )
         except Exception as error:
             raise ValueError(f"{OWNER}: no Ray answers at {address!r}: {' '.join(str(error).split())}") from error
 
@@ -168,6 +184,17 @@ class Ray:
                 failures.append((task, _died()))
         _raise_first(failures)
         return results
+
+
+def _knock(address: str | None) -> None:
+    """Open and close a connection to the head of a cluster, where one is named: Ray itself would try for minutes.
+
+    Raises:
+        OSError: nobody listens there.
+    """
+    found = re.fullmatch(r"(?:ray://)?([^/:]+):(\d{1,5})", address or "")
+    if found:
+        socket.create_connection((found[1], int(found[2])), PATIENCE).close()
 
 
 def _compute(task: Task) -> Any:

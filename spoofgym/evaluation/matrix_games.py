@@ -14,9 +14,11 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.trained import spoofer_config
+from spoofgym.evaluation.defenders import check_names
 from spoofgym.evaluation.matrix import detection_curves, matrix_report, matrix_rows
 from spoofgym.evaluation.monte_carlo import WatchedEpisodes, watch_attack
 from spoofgym.evaluation.progress import Progress, silent
+from spoofgym.evaluation.seeds import seed_rows
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.optimal import ORACLES, oracles
 from spoofgym.scenario import Scenario
@@ -103,9 +105,10 @@ class Matrix:
 
         Raises:
             ValueError: a part that is unknown or does not fit the scenario, or a policy that sees its detector's
-                statistics.
+                statistics or has the name of another one.
         """
         self.check_knowledge(policies)
+        check_names(policies)
         with progress("attacks"):
             scripted = self._attacks(attacks)
         with progress("thresholds"):
@@ -116,7 +119,8 @@ class Matrix:
             games = self._play(attack, ready, progress)
             rows += matrix_rows(ready, attack.name, games)
             curves += detection_curves(ready, clean, attack.name, games)
-        return matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
+        report = matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
+        return {**report, "learned": seed_rows(rows, policies)}
 
     def check_knowledge(self, policies: Sequence[LearnedSpoofer]) -> None:
         """Refuse policies that see the statistics of a detector.

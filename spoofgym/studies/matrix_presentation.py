@@ -86,6 +86,8 @@ def matrix_tables(report: dict[str, Any]) -> Group:
             columns = range(first, min(first + COLUMNS, len(attacks)))
             parts.append(_block(title, [names[name] for name in detectors], columns, figures))
     parts.append(Text("\n".join(f"{place:>3} {attack}" for place, attack in enumerate(attacks))))
+    if report["learned"]:
+        parts.append(learned_table(report))
     parts.append(Text("\n".join(ensemble_notes(report))))
     parts.append(
         Text(
@@ -94,6 +96,31 @@ def matrix_tables(report: dict[str, Any]) -> Group:
         )
     )
     return Group(*parts)
+
+
+def learned_table(report: dict[str, Any]) -> Table:
+    """Learned spoofers by what they were trained against: the mean over their seeds, and the range in brackets."""
+    names = short_names(report)
+    ensembles = [name for name, short in names.items() if short.startswith(ENSEMBLE)]
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    heads = ("seeds", "undetected error, m", "detected by it, %", "best other attack, m")
+    table.add_column("\ntrained against", no_wrap=True)
+    for name in (*heads, *(f"by {names[name]}, %" for name in ensembles)):
+        table.add_column(f"\n{name}", justify="right")
+    for row in report["learned"]:
+        error = f"{row['mean_undetected_error_m']:.1f}"
+        if len(row["policies"]) > 1:
+            error += f" [{row['least_m']:.1f}, {row['most_m']:.1f}]"
+        detected = [_percent(row["detection"][name]) for name in (row["trained_against"], *ensembles)]
+        other = f"{row['best_other_m']:.1f} ({row['best_other_attack']})"
+        own = names[row["trained_against"]]
+        table.add_row(own, str(len(row["policies"])), error, detected[0], other, *detected[1:])
+    return table
+
+
+def _percent(shares: list[float]) -> str:
+    mean = f"{100.0 * np.mean(shares):.1f}"
+    return mean if len(shares) == 1 else f"{mean} [{100.0 * min(shares):.1f}, {100.0 * max(shares):.1f}]"
 
 
 def _block(title: str, rows: list[str], columns: range, figures: Floats) -> Table:
