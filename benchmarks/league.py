@@ -236,7 +236,7 @@ def measure(scenarios: Sequence[str], games: int, show: Callable[[str], None]) -
             if not place:
                 keep("disk", [disk(duel, inside)])
                 keep("engines", engines(duel, inside))
-        keep("solving", solving())
+                keep("solving", solving())
     return tables
 
 
