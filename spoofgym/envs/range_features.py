@@ -38,6 +38,18 @@ def bounding_detectors(simulation: Simulation, names: Sequence[str]) -> tuple[st
     return tuple(name for name in names if isinstance(simulation.detectors[name], Bounding))
 
 
+def direction_of(detector: Bounding) -> str:
+    """The direction that a detector's protection level bounds: up unless it says another."""
+    return str(getattr(detector, "direction", "up"))
+
+
+def filter_protection_levels(covariance: Floats) -> tuple[Floats, Floats]:
+    """The filter's own, K sigma of its covariance (N, 3, 3): horizontal and vertical, (N,) each, m."""
+    east, north, cross = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
+    largest = 0.5 * (east + north) + np.sqrt(0.25 * (east - north) ** 2 + cross**2)
+    return HORIZONTAL_FACTOR * np.sqrt(largest), VERTICAL_FACTOR * np.sqrt(covariance[:, 2, 2])
+
+
 def satellites_in_view(simulation: Simulation) -> Flags:
     """Whether each slot holds a satellite in the present epoch, (N, S); none in an outage, S = 0 on fixes."""
     epoch = simulation.epoch
@@ -78,13 +90,12 @@ class RangeFeatures:
         self.fields = range_fields(scenario.slots, bounding)
         self._simulation, self._slots = simulation, scenario.slots
         self._horizontal, self._vertical = scenario.alert_limits
-        levels = ((simulation.detectors[name], self._limit(name)) for name in bounding)
-        self._bounding = [(detector, limit) for detector, limit in levels if isinstance(detector, Bounding)]
+        found = (simulation.detectors[name] for name in bounding)
+        self._bounding = [(detector, self._limit(detector)) for detector in found if isinstance(detector, Bounding)]
 
-    def _limit(self, detector: str) -> float:
-        """The alert limit of a detector's protection level, m: by the axes that it tests, up unless it says others."""
-        direction = getattr(self._simulation.detectors[detector], "direction", "up")
-        return self._vertical if direction == "up" else self._horizontal
+    def _limit(self, detector: Bounding) -> float:
+        """The alert limit of a detector's protection level, m."""
+        return self._vertical if direction_of(detector) == "up" else self._horizontal
 
     def __call__(self) -> Floats:
         """Of the present epoch, before its ranges are resolved, (N, F)."""
@@ -100,13 +111,8 @@ class RangeFeatures:
 
     def _own_levels(self, covariance: Floats) -> tuple[Floats, Floats]:
         """K sigma of the filter's covariance (N, 3, 3) over the alert limits, horizontal and vertical, (N,) each."""
-        east, north, cross = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
-        largest = 0.5 * (east + north) + np.sqrt(0.25 * (east - north) ** 2 + cross**2)
-        up = covariance[:, 2, 2]
-        return (
-            HORIZONTAL_FACTOR * np.sqrt(largest) / self._horizontal,
-            VERTICAL_FACTOR * np.sqrt(up) / self._vertical,
-        )
+        horizontal, vertical = filter_protection_levels(covariance)
+        return horizontal / self._horizontal, vertical / self._vertical
 
     def _detectors_levels(self) -> list[Floats]:
         return [detector.protection_level / limit for detector, limit in self._bounding]
