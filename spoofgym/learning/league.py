@@ -21,13 +21,14 @@ from spoofgym.attacks.base import KNOWLEDGE
 from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, count, run_folder, seed_number, share, threads
 from spoofgym.console import console, show
 from spoofgym.envs.duel_config import DuelConfig
+from spoofgym.envs.payoffs import Beyond, Payoff, make_payoff
 from spoofgym.evaluation.defenders import fits
 from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.evaluation.engine import ENGINES, Engine, Here, make_engine
 from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import MORE_GAMES, League, LeagueSettings
-from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WITHOUT_ALARM, WORLD_DETECTORS, tuned_for
+from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WITHOUT_ALARM, WORLD_DETECTORS, keeps_within, tuned_for
 from spoofgym.program import do_all, give_json, program
 from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
@@ -94,11 +95,12 @@ def engine_of(options: argparse.Namespace) -> Engine:
     return make_engine(options.engine, options.workers, options.address)
 
 
-def classical_defenders(scenario: Scenario) -> tuple[str, ...]:
-    """Every classical defender that fits a scenario, and the yardsticks, as they are spelled."""
+def classical_defenders(scenario: Scenario, payoff: Payoff) -> tuple[str, ...]:
+    """Every classical defender that fits a scenario and a payoff, and the yardsticks, as they are spelled."""
     listed = [*PUBLISHED, *tuned_for(scenario.name)]
     spelled = [f"{each.detector}{SEPARATOR}{each.response}" for each in listed if fits(each.detector, scenario)]
-    alone = [name for name in WITHOUT_ALARM if set(make_response(name).needs) <= set(scenario.offers)]
+    weighing = [*WITHOUT_ALARM, *([keeps_within(payoff.limit)] if isinstance(payoff, Beyond) else [])]
+    alone = [name for name in weighing if set(make_response(name).needs) <= set(scenario.offers)]
     return (*dict.fromkeys(spelled), *alone, *YARDSTICKS)
 
 
@@ -109,7 +111,7 @@ def duel_of(options: argparse.Namespace) -> tuple[DuelConfig, tuple[str, ...]]:
         ValueError: a part that is unknown or does not fit.
     """
     scenario = make_scenario(options.scenario)
-    defenders = tuple(options.defender or classical_defenders(scenario))
+    defenders = tuple(options.defender or classical_defenders(scenario, make_payoff(options.payoff, scenario)))
     duel = DuelConfig(
         scenario=options.scenario,
         detectors=tuple(options.detector or (name for name in WORLD_DETECTORS if fits(name, scenario))),

@@ -54,6 +54,15 @@ PUBLISHED = (
 WITHOUT_ALARM = ("multiple-hypothesis",)
 """Responses that follow no alarm, but weigh the innovations themselves."""
 
+
+def keeps_within(limit: float) -> str:
+    """The multiple-hypothesis defender that seeks to keep the error within an alert limit, m.
+
+    Its options are the best of some ten on the drive with a limit of 50 m, against attacks that no test sees.
+    """
+    return f"multiple-hypothesis:ahead=30,hidden=0.7,amplitude=3,limit={limit:g}"
+
+
 GRID_DETECTORS = ("windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
 GRID_DEPTHS = (0, 10, 20, 50)
 GRID_REUSES = (0, 5, 12)

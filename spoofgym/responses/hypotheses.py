@@ -11,7 +11,7 @@ is another one: a mixture of the two attacks that move the position most per uni
 - multipath may begin or end, which adds noise to the fixes;
 - every hypothesis is weighted by the likelihood of the fix, and the heaviest are kept.
 
-This is multiple-hypothesis tracking (Reid 2179; Blackman 2004) of a spoofer instead of a target. The unaided solution
+This is multiple-hypothesis tracking (Reid 1979; Blackman 2004) of a spoofer instead of a target. The unaided solution
 never depends on what the defender decides, so the bank is the same for every decision.
 """
 

@@ -49,6 +49,8 @@ class MultipleHypothesis(Response):
         hidden: probability that a hidden pull has begun with the game: a mixture of the attacks that move the position
             most per unit of noncentrality (`quiet_offsets`), which look like inertial drift.
         amplitude: 1 sigma of its two amplitudes, the roots of their noncentralities.
+        limit: alert limit, m: the solution is taken that is least likely to be farther from the truth, now and a while
+            ahead, and not the one with the least expected error; 0 = none.
 
     Raises:
         ValueError: a value out of range.
@@ -73,6 +75,7 @@ class MultipleHypothesis(Response):
         multipath: float = 6.0,
         hidden: float = 0.1,
         amplitude: float = 4.0,
+        limit: float = 0.0,
     ) -> None:
         self.hypotheses = validation.epochs(KIND, "hypotheses", hypotheses, 2)
         self.history = validation.epochs(KIND, "history", history, 0, validation.LONGEST_TABLE)
@@ -88,6 +91,7 @@ class MultipleHypothesis(Response):
         self.multipath = validation.non_negative(KIND, "multipath", multipath)
         self.hidden = validation.share(KIND, "hidden", hidden)
         self.amplitude = validation.above(KIND, "amplitude", amplitude)
+        self.limit = validation.non_negative(KIND, "limit", limit)
         self.demands = Demands(excludes=True, history=self.history, auxiliary=True)
 
     @property
@@ -159,5 +163,5 @@ class MultipleHypothesis(Response):
         choice = Choice(np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64), np.zeros(n))
         advance(every, epoch.index, fixes, fix, self._model, self._kinds, self._bank)
         carry_past(every, epoch.index, self._model.transition, view.backtracked, solutions)
-        choose(every, epoch.index, fix, self._rows, self._bank, solutions, choice)
+        choose(every, epoch.index, fix, self._rows, self._bank, solutions, self.limit, choice)
         return Decision(choice.use, choice.backtrack)

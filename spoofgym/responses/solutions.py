@@ -6,6 +6,7 @@ decision and both meet the same inertial noise, so Φ alone carries such a diffe
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,10 @@ MOMENTS = 2
 """The error is looked at now and a while ahead."""
 SEEN = 2 * MOMENTS
 """Horizontal positions at these moments."""
+SIZE_SHARE = 1e-3
+"""What an error as large as the limit is worth beside exceeding it."""
+TINY = 1e-12
+"""A variance below which a position is known, m²."""
 
 
 class Solutions(NamedTuple):
@@ -46,7 +51,7 @@ class Choice(NamedTuple):
     Attributes:
         use: the present fix, (N,).
         backtrack: epochs to take back, (N,).
-        expected: expected error of the solution chosen, mean of both moments, (N,), m.
+        expected: what the error of the solution chosen is expected to be worth, mean of both moments, (N,).
     """
 
     use: Flags
@@ -118,16 +123,57 @@ def _variance(rows: Floats, covariance: Floats) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def expected_error(weight: Floats, means: Floats, variances: Floats, seen: Floats) -> float:
-    """Expected distance of a solution from the truth, mean of both moments, m.
+def exceedance(square: float, variance: float, limit: float) -> float:
+    """Probability that a horizontal Gaussian vector is longer than a limit.
 
-    The distance under a Gaussian hypothesis is taken as √(|μ|² + tr Σ).
+    With equal variances σ² of both axes |e|²/σ² has the noncentral chi-square distribution of two degrees of freedom
+    and noncentrality λ = |μ|²/σ². Its power h is nearly normal (Sankaran 1963); the probability is right to 0.02.
+
+    Args:
+        square: |μ|², m².
+        variance: 2 σ², m².
+        limit: m.
+    """
+    if variance < TINY:
+        return 1.0 if square > limit * limit else 0.0
+    noncentrality = 2.0 * square / variance
+    mean = 2.0 + noncentrality
+    h = 1.0 - mean * (2.0 + 3.0 * noncentrality) * 2.0 / (3.0 * (2.0 + 2.0 * noncentrality) ** 2)
+    p = (2.0 + 2.0 * noncentrality) / mean**2
+    m = (h - 1.0) * (1.0 - 3.0 * h)
+    centre = 1.0 + h * p * (h - 1.0 - 0.5 * (2.0 - h) * m * p)
+    spread = h * math.sqrt(2.0 * p) * (1.0 + 0.5 * m * p)
+    return 0.5 * math.erfc(((2.0 * limit * limit / (variance * mean)) ** h - centre) / (spread * math.sqrt(2.0)))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _price(square: float, variance: float, limit: float) -> float:
+    """What an error is expected to be worth under a Gaussian hypothesis.
+
+    Without a limit that is its size, taken as √(|μ|² + tr Σ), m. With one it is the probability that the error exceeds
+    the limit, and a small share of the size, because far from the limit all are alike.
+
+    Args:
+        square: |μ|², m².
+        variance: tr Σ, m².
+        limit: m; 0 = none.
+    """
+    size = math.sqrt(square + variance)
+    if limit == 0.0:
+        return size
+    return exceedance(square, variance, limit) + SIZE_SHARE * size / limit
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def expected_loss(weight: Floats, means: Floats, variances: Floats, seen: Floats, limit: float) -> float:
+    """What the error of a solution is expected to be worth, mean of both moments.
 
     Args:
         weight: probabilities of the hypotheses, (M,).
         means: positions of the unaided solution's error at both moments, (M, 4), m.
         variances: traces of their horizontal covariances, (M, 2), m².
         seen: the same positions of the unaided solution minus this one, (4,), m.
+        limit: that an error shall not exceed, m; 0 = an error is worth its size, m.
     """
     total = 0.0
     for h in range(len(weight)):
@@ -135,15 +181,22 @@ def expected_error(weight: Floats, means: Floats, variances: Floats, seen: Float
             for moment in range(MOMENTS):
                 east = means[h, 2 * moment] - seen[2 * moment]
                 north = means[h, 2 * moment + 1] - seen[2 * moment + 1]
-                total += weight[h] * np.sqrt(east * east + north * north + variances[h, moment])
+                total += weight[h] * _price(east * east + north * north, variances[h, moment], limit)
     return total / MOMENTS
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def choose(
-    runs: Runs, index: Runs, available: Flags, rows: Floats, bank: Bank, solutions: Solutions, choice: Choice
+    runs: Runs,
+    index: Runs,
+    available: Flags,
+    rows: Floats,
+    bank: Bank,
+    solutions: Solutions,
+    limit: float,
+    choice: Choice,
 ) -> None:
-    """Choose the solution whose expected error is least; of equal ones the filter's, then the least depth.
+    """Choose the solution whose error is expected to be worth least; of equal ones the filter's, then the least depth.
 
     Args:
         runs: which, (n,).
@@ -152,6 +205,7 @@ def choose(
         rows: of `look_ahead`, (K+1, 4, 15).
         bank: the hypotheses.
         solutions: those that can be chosen.
+        limit: that an error shall not exceed, m; 0 = an error is worth its size.
         choice: filled.
     """
     hypotheses = bank.log_weight.shape[1]
@@ -171,12 +225,12 @@ def choose(
             for j in range(NUM_INERTIAL):
                 used[j] = solutions.filter[run, j] + solutions.correction[run, j]
             _seen(looked, used, seen)
-            best = expected_error(weight, means, variances, seen)
+            best = expected_loss(weight, means, variances, seen, limit)
             choice.use[run] = True
         for n in range(min(solutions.reach[run], solutions.past.shape[1] - 1) + 1):
             _seen(looked, solutions.past[run, n], seen)
-            error = expected_error(weight, means, variances, seen)
-            if error < best - 1e-9:
-                best = error
+            loss = expected_loss(weight, means, variances, seen, limit)
+            if loss < best - 1e-9:
+                best = loss
                 choice.use[run], choice.backtrack[run] = False, n
         choice.expected[run] = best

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from spoofgym.attacks import make_attack
 from spoofgym.navigation.error_model import POSITION
 from spoofgym.navigation.interface import Decision
 from spoofgym.optimum import game_gain
+from spoofgym.policies.classical import keeps_within
 from spoofgym.responses import make_response
 from spoofgym.responses.multiple_hypothesis import MultipleHypothesis
+from spoofgym.responses.solutions import exceedance, expected_loss
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
@@ -79,10 +82,31 @@ def test_an_attack_that_no_test_sees_costs_it_less_and_clean_games_hardly_more()
     assert mean_error(response, 0.0 * pulls) < mean_error("always-use", 0.0 * pulls) + 0.5
 
 
+@pytest.mark.parametrize("distance", [0.0, 20.0, 49.0, 60.0, 200.0])
+@pytest.mark.parametrize("sigma", [1e-7, 1.0, 10.0, 30.0, 300.0])
+def test_the_probability_of_exceeding_a_limit_is_that_of_a_noncentral_chi_square(distance, sigma):
+    exact = stats.ncx2.sf((50.0 / sigma) ** 2, 2, (distance / sigma) ** 2)
+    assert exceedance(distance**2, 2.0 * sigma**2, 50.0) == pytest.approx(exact, abs=0.02)
+
+
+def test_a_limit_takes_the_solution_that_keeps_within_it():
+    """One solution is right in nine of ten cases and else 120 m off; the other is 75 m off, and else 45 m."""
+    weight, variances = np.array([0.9, 0.1]), np.full((2, 2), 1.0)
+    means = np.array([[0.0, 0.0] * 2, [120.0, 0.0] * 2])
+    likely, safe = np.zeros(4), np.array([75.0, 0.0] * 2)
+
+    def loss(solution, limit):
+        return expected_loss(weight, means, variances, solution, limit)
+
+    assert loss(likely, 0.0) < loss(safe, 0.0)
+    assert loss(safe, 80.0) < loss(likely, 80.0)
+
+
 def test_the_name_builds_it_again():
     given = "multiple-hypothesis:hypotheses=8,hidden=0,onset=300"
     assert make_response(given).name == "multiple-hypothesis:hypotheses=8,onset=300,hidden=0"
     assert make_response("multiple-hypothesis").name == "multiple-hypothesis"
+    assert make_response(keeps_within(50.0)).name == keeps_within(50.0)
 
 
 @pytest.mark.parametrize(
@@ -94,6 +118,7 @@ def test_the_name_builds_it_again():
         ("foi-drive", "multiple-hypothesis:hypotheses=1", "hypotheses must be"),
         ("foi-drive", "multiple-hypothesis:hidden=1.5", "hidden must be"),
         ("foi-drive", "multiple-hypothesis:amplitude=0", "amplitude must be"),
+        ("foi-drive", "multiple-hypothesis:limit=-1", "limit must be"),
     ],
 )
 def test_what_does_not_fit_is_refused(scenario, response, message):
