@@ -1,0 +1,61 @@
+// Lines over a common axis on uPlot, each with its interval as a band: learning curves, values per round.
+"use strict";
+
+(() => {
+  const HEIGHT = 300;
+  const faded = (colour) => `${colour}33`;
+
+  function colours(figure) {
+    let place = -1;
+    return figure.lines.map((line) => {
+      if (!line.faint || place < 0) place += line.faint ? 0 : 1;
+      return { colour: page.seriesColour(Math.max(place, 0)), dash: line.faint ? [2, 3] : page.seriesDash(Math.max(place, 0)), width: line.faint ? 1 : 2.5 };
+    });
+  }
+
+  function span(figure) {
+    const known = figure.lines.flatMap((line) => [line.y, line.low || [], line.high || []].flat()).filter((value) => value !== null);
+    const [low, high] = [Math.min(...known), Math.max(...known)];
+    const room = 0.06 * (high - low || Math.abs(high) || 1);
+    return [low >= 0 && low < 0.4 * high ? 0 : low - room, high + room];
+  }
+
+  page.figures.lines = (node, figure) => {
+    const sheet = page.element("div");
+    const legend = page.element("div");
+    let plot = null;
+
+    function draw() {
+      if (plot) plot.destroy();
+      const styles = colours(figure);
+      const ends = [figure.x[0], figure.x[figure.x.length - 1]];
+      const room = ends[0] === ends[1] ? 1 : 0;
+      const options = page.plotOptions(page.width(sheet), HEIGHT, { xLabel: figure.x_label, xRange: [ends[0] - room, ends[1] + room], scale: { range: span(figure) }, whole: figure.whole });
+      options.axes[0].values = (_, marks) => marks.map((mark) => page.number(mark));
+      const data = [figure.x];
+      options.bands = [];
+      figure.lines.forEach((line, place) => {
+        options.series.push({ ...page.plotSeries(styles[place]), points: { show: figure.x.length < 30, size: 6, fill: styles[place].colour } });
+        data.push(line.y);
+        if (line.low === null) return;
+        for (const edge of [line.high, line.low]) {
+          options.series.push(page.plotSeries({ colour: faded(styles[place].colour), width: 1 }));
+          data.push(edge);
+        }
+        options.bands.push({ series: [data.length - 2, data.length - 1], fill: faded(styles[place].colour) });
+      });
+      sheet.replaceChildren();
+      plot = new uPlot(options, data, sheet);
+      legend.replaceChildren(page.legend(figure.lines.map((line, place) => ({ name: line.name, ...styles[place] }))), page.element("div", { class: "legend" }, figure.y_label));
+    }
+
+    node.append(legend, sheet);
+    draw();
+    page.onResize(sheet, draw);
+    page.onTheme(draw);
+    return () => ({
+      columns: [figure.x_label, ...figure.lines.flatMap((line) => (line.low === null ? [line.name] : [line.name, `${line.name}, from`, `${line.name}, to`]))],
+      rows: figure.x.map((x, k) => [x, ...figure.lines.flatMap((line) => (line.low === null ? [line.y[k]] : [line.y[k], line.low[k], line.high[k]]))]),
+    });
+  };
+})();

@@ -1,0 +1,48 @@
+"""Write one HTML page of games and results: figures that are read offline, on a phone, too.
+
+    python -m spoofgym.report.program evaluation.json matrix.json -o report.html
+    python -m spoofgym.report.program runs/league runs/seed0 runs/seed1 --title "The league of May" -o report.html
+
+What it reads is JSON of the other programs and run folders; `spoofgym.report.sources` says which.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from spoofgym.command_line import Parser, output
+from spoofgym.program import program
+from spoofgym.report.page import write_page
+
+DEFAULT_PAGE = "report.html"
+
+
+def parser() -> Parser:
+    """The command line."""
+    result = Parser(
+        prog="python -m spoofgym.report.program",
+        description="Write one HTML page of games and results. It is complete in itself and needs no network.",
+    )
+    add = result.add_argument
+    add("sources", nargs="+", metavar="FILE|RUN",
+        help="JSON that a program of spoofgym has written, or the folder of a training or of a league; runs that "
+        "differ in their seed only share a figure")
+    add("-o", "--out", type=output, default=Path(DEFAULT_PAGE), metavar="FILE",
+        help="the page (default: %(default)s)")
+    add("--title", help="of the page (default: that of the first source)")
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    write_page(options.out, [Path(source) for source in options.sources], options.title)
+    print(f"page in {options.out}", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
