@@ -15,7 +15,7 @@ help: ## show this list
 
 demo: install ## train a PPO spoofer, evaluate it, write tables and a figure to runs/demo
 	$(BIN) -m train.spoofer --out $(DEMO)
-	$(BIN) -m spoofgym.studies.evaluate --attacker $(DEMO) --json $(DEMO)/evaluation.json --figure $(DEMO)/evaluation.png
+	$(BIN) -m spoofgym evaluate spoofers --attacker $(DEMO) --json $(DEMO)/evaluation.json --figure $(DEMO)/evaluation.png
 
 # where bytecode is switched off, each worker and each program that a test starts would compile all sources anew
 test: install-dev ## run the tests; options in ARGS, e.g. make test ARGS="-k geodesy"

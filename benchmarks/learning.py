@@ -26,7 +26,7 @@ from spoofgym.learning import spoofer
 from spoofgym.learning.ppo import Settings
 from spoofgym.learning.run_folder import DEFAULT_STEPS, RunFolder
 from spoofgym.program import do_all, give_json, program
-from spoofgym.studies import evaluate
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 
 
 @program
@@ -63,7 +63,8 @@ def _row(options: argparse.Namespace, seed: int) -> dict[str, Any]:
     seconds = _train(options, seed, path)
     result = path / "evaluation.json"
     with contextlib.redirect_stdout(sys.stderr):  # the rows of this program have stdout for themselves
-        _succeed(evaluate.main(["--detector", options.detector, "--attacker", str(path), "--json", str(result)]))
+        given = ["--detector", options.detector, "--attacker", str(path), "--json", str(result)]
+        _succeed(evaluate_spoofers.main(given))
     rows = {row["attacker"]: row for row in json.loads(result.read_text())["rows"]}
     return {
         "seed": seed,

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from spoofgym import figures, files
+from spoofgym.validation import nearest
 
 STDOUT = "-"
+EXAMPLES = "examples:"
 MOST_THREADS = 1024
 MOST_COUNT = 10**12
 """Of anything: no computer would come to an end with more."""
@@ -17,12 +20,59 @@ LARGEST_LEARNER_SEED = 2**32 - 1
 """NumPy's older generator, which Stable-Baselines3 seeds, takes no larger one; those of the games do."""
 
 
+class Help(argparse.HelpFormatter):
+    """Folds what a help text says to the terminal, and leaves its examples as they are, so that they can be copied."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        if text.startswith(EXAMPLES):
+            return "\n".join(indent + line for line in text.splitlines())
+        return super()._fill_text(text, width, indent)
+
+
 class Parser(argparse.ArgumentParser):
-    """An `argparse` parser whose errors take one line."""
+    """An `argparse` parser whose errors take one line and name the nearest option, and whose help ends with examples.
+
+    Attributes:
+        examples: commands to copy, one a line.
+    """
+
+    def __init__(self, *arguments: Any, examples: Sequence[str] = (), **options: Any) -> None:
+        """Take what `argparse.ArgumentParser` takes, and the examples."""
+        options.setdefault("formatter_class", Help)
+        if examples:
+            options.setdefault("epilog", "\n".join([EXAMPLES, *(f"  {line}" for line in examples)]))
+        super().__init__(*arguments, **options)
+        self.examples = tuple(examples)
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """The options of a command line; one that is unknown is told together with the nearest that is known."""
+        found, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            known = _options(self)
+            given = next((text.partition("=")[0] for text in unknown if text.startswith("-")), "")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{nearest(given, known)}")
+        return found
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse what is none of an argument's choices; the nearest of them is named."""
+        if action.choices is not None and value not in action.choices:
+            valid = [str(choice) for choice in action.choices]
+            told = f"invalid choice: {value!r}{nearest(str(value), valid)} (choose from {', '.join(valid)})"
+            raise argparse.ArgumentError(action, told)
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong and exit with status 2."""
-        self.exit(2, f"error: {' '.join(message.split())} (--help lists the options)\n")
+        self.exit(2, f"error: {' '.join(message.split())} ({self.prog} --help lists the options)\n")
+
+
+def _options(parser: argparse.ArgumentParser) -> list[str]:
+    """Every option of a parser and of its subcommands."""
+    names: list[str] = []
+    for action in parser._actions:
+        names += action.option_strings
+        if isinstance(action, argparse._SubParsersAction):
+            names += [name for inner in action.choices.values() for name in _options(inner)]
+    return names
 
 
 def count(text: str) -> int:

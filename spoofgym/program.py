@@ -84,9 +84,9 @@ def moved(new: str) -> int:
     """Say where a command has gone; returns the exit status.
 
     Args:
-        new: module that holds it now.
+        new: how it is called now.
     """
-    say(f"error: this command has moved: python -m {new}")
+    say(f"error: this command has moved: {new}")
     return USAGE
 
 

@@ -12,11 +12,11 @@ import inspect
 import re
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from spoofgym.validation import shown
+from spoofgym.validation import nearest, shown
 
 Part = TypeVar("Part")
 
@@ -131,7 +131,7 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
         raise TypeError(f"{kind} must be a specification ({valid}) or an object of its class, got {shown(text)}")
     specification = Specification.parse(text)
     if specification.name not in registry:
-        raise ValueError(f"unknown {kind} {shown(specification.name)}; valid names: {', '.join(sorted(registry))}")
+        raise ValueError(unknown_name(kind, specification.name, registry))
     factory = registry[specification.name]
     parameters = inspect.signature(factory).parameters
     hints = typing.get_type_hints(factory.__init__ if inspect.isclass(factory) else factory)
@@ -148,8 +148,9 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
         valid = ", ".join(parameters) or "none"
         nested = specification.value is not None and ":" in specification.value
         hint = "; for an option of the part within, write '/' in place of ','" if nested else ""
-        options = f"valid options: {valid}{hint}"
-        raise ValueError(f"{kind} {specification.name!r} has no option {shown(unknown[0])}; {options}")
+        close = nearest(unknown[0], parameters) or ";"
+        told = f"{kind} {specification.name!r} has no option {shown(unknown[0])}{close}"
+        raise ValueError(f"{told} valid options: {valid}{hint}")
     missing = [p.name for p in parameters.values() if p.default is inspect.Parameter.empty and p.name not in arguments]
     if missing:
         example = f"{specification.name}:{missing[0]}=..."
@@ -161,6 +162,12 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
         if specification.name in str(error):
             raise
         raise ValueError(f"{kind} {specification.name!r}: {error}") from error
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
+    """The message about a part whose name is unknown: the nearest valid name, if any is near, and all of them."""
+    names = sorted(valid)
+    return f"unknown {kind} {shown(name)}{nearest(name, names) or ';'} valid names: {', '.join(names)}"
 
 
 def _convert(text: str, key: str, value: str, annotation: Any) -> Any:

@@ -14,7 +14,8 @@ PACKAGE = Path(spoofgym.__file__).parent
 ROOMS = (
     *("geodesy", "mechanization", "timeline", "trajectory", "truth", "sensors", "navigation", "attacks"),
     *("detectors", "responses", "scenario", "clean_starts", "fitting", "simulation", "logs", "scenarios"),
-    *("calibration", "optimum", "policies", "envs", "duel", "evaluation", "studies", "report", "learning", "cli"),
+    *("calibration", "optimum", "policies", "envs", "duel", "evaluation", "studies", "report", "learning"),
+    *("cli", "__main__"),
 )
 """In the order of docs/architecture.md. What is not named is the ground floor, which knows no room."""
 FILTERS = ("loose", "tight", "credible", "separation")
@@ -63,7 +64,7 @@ def place(module: str) -> int:
 
 def test_every_room_is_there() -> None:
     rooms = {room(module) for module in sources()}
-    planned = {"report", "cli"}
+    planned = {"report"}
     assert set(ROOMS) - rooms <= planned
     folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
     assert folders - set(ROOMS) == {"kernels", "validation"} & folders, "a new folder needs its place in the order"

@@ -68,16 +68,16 @@ def test_an_installed_package_has_its_programs_and_agents_in_any_folder(installe
     """Without the checkout: the working directory is empty, and train, tests and benchmarks are not on the path."""
     empty = tmp_path / "empty"
     empty.mkdir()
-    programs = ("studies.evaluate", "studies.tune", "studies.reproduce", "learning.spoofer", "learning.defender")
+    programs = ("evaluate spoofers", "tune", "reproduce", "train spoofer", "train defender")
     code = (
         "import runpy, sys, spoofgym\n"
         "from spoofgym.policies.learned import load_policy\n"
         "from spoofgym.policies.published import policy_folder, published_names\n"
         "print(spoofgym.__file__, published_names(), load_policy(policy_folder('policy:x')).kind)\n"
         f"for name in {programs}:\n"
-        "    sys.argv = [name, '--help']\n"
+        "    sys.argv = ['spoofgym', *name.split(), '--help']\n"
         "    try:\n"
-        "        runpy.run_module(f'spoofgym.{name}', run_name='__main__')\n"
+        "        runpy.run_module('spoofgym', run_name='__main__')\n"
         "    except SystemExit as end:\n"
         "        print(name, end.code)\n"
     )

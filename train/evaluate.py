@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.evaluate`."""
+"""This command is now ``spoofgym evaluate``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.evaluate"))
+    sys.exit(moved("spoofgym evaluate"))

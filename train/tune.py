@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.tune`."""
+"""This command is now ``spoofgym tune``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.tune"))
+    sys.exit(moved("spoofgym tune"))

@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.wrong_shadow`."""
+"""This command is now ``spoofgym study wrong-shadow``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.wrong_shadow"))
+    sys.exit(moved("spoofgym study wrong-shadow"))

@@ -33,7 +33,7 @@ from spoofgym.detectors.signed_mean import SignedMean
 from spoofgym.detectors.solution_separation import SolutionSeparation
 from spoofgym.detectors.whiteness import Whiteness
 from spoofgym.detectors.window_bank import WindowBank
-from spoofgym.specification import Specification, build, unnest, write
+from spoofgym.specification import Specification, build, unknown_name, unnest, write
 
 SETS_THRESHOLD = ("threshold", "p_fa", "preset", "arl0", "jump_threshold", "slow_threshold", "gate", "factor")
 """Options that decide the threshold of a detector."""
@@ -116,7 +116,7 @@ def at_arl0(text: str, arl0: float) -> str:
     decided = any(option in specification.options for option in SETS_THRESHOLD)
     factory = DETECTORS.get(specification.name)
     if factory is None:
-        raise ValueError(f"unknown detector {specification.name!r}; valid names: {', '.join(sorted(DETECTORS))}")
+        raise ValueError(unknown_name("detector", specification.name, DETECTORS))
     if decided or "arl0" not in inspect.signature(factory).parameters:
         return text
     asked = write(validation.average_run_length(specification.name, "arl0", arl0))

@@ -5,7 +5,8 @@ Each has a specification:
 - ``ramp:0.5``, ``exclude``, ...: an attack or a response by its registered name;
 - ``unseen:BUDGET``, ``closed-form:BUDGET``: the optimal attacks of `spoofgym.policies.unseen` and `.furthest`;
 - ``policy:NAME`` or ``policy:FOLDER``: a learned policy, published or in a run folder;
-- ``DETECTOR > RESPONSE``: a response that follows the alarm of one of the game's detectors alone;
+- ``DETECTOR > RESPONSE`` or ``DETECTOR/RESPONSE``: a response that follows the alarm of one of the game's detectors
+  alone;
 - ``pool:A+B+C`` or ``pool:A+B+C,weights=2+1+1``: a pool, from which every run draws its opponent. Within it ``/``
   stands for the comma between the options of a part and ``~`` for ``+``, as in every part within a part; the slashes of
   a ``policy:FOLDER`` stay;
@@ -27,7 +28,7 @@ from spoofgym.attacks.pool import POPULATIONS, AttackPool
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
-from spoofgym.policies.classical import SEPARATOR
+from spoofgym.policies.classical import SEPARATOR, watcher_and_response
 from spoofgym.policies.furthest import NAME as CLOSED_FORM
 from spoofgym.policies.furthest import Furthest
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
@@ -105,11 +106,11 @@ def make_defender(given: Any, scenario: Scenario, detectors: Sequence[Detector])
         return ResponsePool(_members(given, lambda item: make_defender(item, scenario, detectors)))
     if isinstance(given, str) and given.strip().startswith(POLICY):
         return PolicyDefender(LearnedDefender.load(policy_folder(given)), given.strip(), scenario)
-    if isinstance(given, str) and SEPARATOR.strip() in given:
-        watcher, _, response = (part.strip() for part in given.partition(SEPARATOR.strip()))
+    if isinstance(given, str) and (pair := watcher_and_response(given)) is not None:
+        watcher, response = pair
         return Watching(make_defender(response, scenario, detectors), make_detector(watcher).name, detectors)
     if isinstance(given, str) and (name := given.partition(":")[0].strip()) in DETECTORS and name not in RESPONSES:
-        raise ValueError(f"{given!r} is a detector: name the response to its alarm, too, e.g. '{given} > exclude'")
+        raise ValueError(f"{given!r} is a detector: name the response to its alarm, too, e.g. '{given}/exclude'")
     return copy.deepcopy(make_response(given))
 
 
@@ -125,6 +126,8 @@ def _unnested(text: str) -> str:
     """
     if text.strip().startswith(POLICY):
         return text
+    if (pair := watcher_and_response(text)) is not None:
+        return SEPARATOR.join(map(_unnested, pair))
     _, inside, policy = text.partition(POLICY)
     if inside and any("=" not in piece for piece in policy.split("/")[1:]):
         raise ValueError(

@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.acna`."""
+"""This command is now ``spoofgym study acna``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.acna"))
+    sys.exit(moved("spoofgym study acna"))

@@ -27,7 +27,7 @@ from spoofgym.evaluation.duels import Cell, play_cell
 from spoofgym.evaluation.engine import Engine, Notify, Task
 from spoofgym.evaluation.metrics import undetected_error
 from spoofgym.evaluation.monte_carlo import watch_attack
-from spoofgym.policies.classical import SEPARATOR
+from spoofgym.policies.classical import watcher_and_response
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer, load_policy
 from spoofgym.policies.optimal import ORACLES, oracle
 from spoofgym.policies.published import POLICY, policy_folder, published_folder
@@ -157,8 +157,10 @@ def check_player(track: str, text: str) -> None:
         kind = LearnedSpoofer if track == ATTACK else LearnedDefender
         kind.load(policy_folder(given))
         return
-    name = Specification.parse(given).name if SEPARATOR.strip() not in given else SEPARATOR
-    spoofs, defends = name in ATTACKS or name in OPTIMAL or name in ORACLES, name in RESPONSES or name == SEPARATOR
+    pair = watcher_and_response(given)
+    name = Specification.parse(given).name if pair is None else ""
+    spoofs = name in ATTACKS or name in OPTIMAL or name in ORACLES
+    defends = name in RESPONSES or pair is not None
     if track == ATTACK and defends:
         raise ValueError(f"{text!r} defends: it plays the track 'defend'")
     if track != ATTACK and spoofs:
@@ -198,9 +200,10 @@ def watched_by(defender: str) -> tuple[str, ...]:
         seen = defender_config(LearnedDefender.load(policy_folder(given))).detectors
         several = seen if isinstance(seen, tuple) else (seen,)
         return tuple(each if isinstance(each, str) else each.name for each in several)
-    if given.startswith("pool:") or SEPARATOR.strip() not in given:
+    pair = None if given.startswith("pool:") else watcher_and_response(given)
+    if pair is None:
         return ()
-    detector, _, response = (part.strip() for part in given.partition(SEPARATOR.strip()))
+    detector, response = pair
     return detector, *watched_by(response)
 
 

@@ -3,7 +3,7 @@
 Nothing here may change, nor how an environment behaves: either makes a v2, a module of its own beside this one.
 ``tests/evaluation/test_benchmark_v1.py`` holds the digest of this definition and some games of two tasks.
 
-The references are scores of the pinned players on the very games of v1: ``python -m spoofgym.studies.benchmark
+The references are scores of the pinned players on the very games of v1: ``spoofgym benchmark
 references attack`` (or ``defend``) plays them again and compares. An exact optimum is that of
 `spoofgym.optimum.bounded_optimum`.
 """

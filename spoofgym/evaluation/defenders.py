@@ -286,10 +286,13 @@ def evaluate_defenders(
         progress: shows what is played.
 
     Raises:
-        ValueError: two policies of one name, one that was trained on another observation, or one or a given defender
-            whose detector does not fit the scenario.
+        ValueError: a given defender that is unknown, two policies of one name, one that was trained on another
+            observation, or one or a given defender whose detector does not fit the scenario.
     """
     check_names(policies)
+    for defender in given:
+        make_detector(defender.detector)
+        make_defender(defender.response, scenario, ())
     listed = listed_for(scenario)
     kinds: dict[str, str] = {}
     report_rows, pairs, gaps = [], [], []

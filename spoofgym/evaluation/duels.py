@@ -17,7 +17,7 @@ from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DuelGame
 from spoofgym.evaluation.episodes import batches
 from spoofgym.evaluation.metrics import mean_interval
-from spoofgym.policies.classical import SEPARATOR
+from spoofgym.policies.classical import watcher_and_response
 
 LANES = 1000
 """Games that are played together; what a game is worth does not depend on it."""
@@ -123,8 +123,8 @@ def with_detectors_of(config: Config, defenders: Sequence[Any]) -> Config:
         defenders: specifications.
     """
     given = config.detectors if isinstance(config.detectors, tuple) else (config.detectors,)
-    texts = [text for text in defenders if isinstance(text, str) and SEPARATOR.strip() in text]
-    followed = [text.partition(SEPARATOR.strip())[0].strip() for text in texts]
+    pairs = [watcher_and_response(text) for text in defenders if isinstance(text, str)]
+    followed = [pair[0] for pair in pairs if pair is not None]
     return replace(config, detectors=tuple(dict.fromkeys([*given, *followed])))
 
 

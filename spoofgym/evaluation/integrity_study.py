@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.integrity`."""
+"""This command is now ``spoofgym integrity``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.integrity"))
+    sys.exit(moved("spoofgym integrity"))

@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.patient_spoofer`."""
+"""This command is now ``spoofgym study patient-spoofer``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.patient_spoofer"))
+    sys.exit(moved("spoofgym study patient-spoofer"))

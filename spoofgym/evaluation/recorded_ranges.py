@@ -291,4 +291,4 @@ def side_by_side(path: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.recorded_ranges"))
+    sys.exit(moved("spoofgym study recorded-ranges"))

@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.reproduce`."""
+"""This command is now ``spoofgym reproduce``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.reproduce"))
+    sys.exit(moved("spoofgym reproduce"))

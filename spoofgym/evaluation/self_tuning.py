@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.self_tuning`."""
+"""This command is now ``spoofgym study self-tuning``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.self_tuning"))
+    sys.exit(moved("spoofgym study self-tuning"))

@@ -1,8 +1,8 @@
-"""This command has moved to `spoofgym.studies.thresholds`."""
+"""This command is now ``spoofgym thresholds``."""
 
 import sys
 
 from spoofgym.program import moved
 
 if __name__ == "__main__":
-    sys.exit(moved("spoofgym.studies.thresholds"))
+    sys.exit(moved("spoofgym thresholds"))

@@ -1,6 +1,6 @@
 """Train an agent again, from its recipe.
 
-    python -m spoofgym.learning.again NAME --out runs/again
+    spoofgym train again NAME --out runs/again
 
 NAME is a published agent or the folder of one. What trains is the program that the recipe names, with its options.
 """
@@ -16,12 +16,18 @@ from pathlib import Path
 from spoofgym.command_line import Parser, run_folder, threads
 from spoofgym.policies.published import policy_folder
 from spoofgym.policies.recipe import RECIPE_FILE, read_recipe
-from spoofgym.program import program
+from spoofgym.program import moved, program
+
+EXAMPLES = (
+    "spoofgym train again liu-flight-snapshot-spoofer --out runs/again",
+)
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.learning.again", description="Train an agent again, from its recipe.")
+    result = Parser(
+        prog="spoofgym train again", description="Train an agent again, from its recipe.", examples=EXAMPLES
+    )
     add = result.add_argument
     add("agent", metavar="NAME", help="published agent, or the folder of one")
     add("--out", type=run_folder, default=Path("runs/again"), help="run folder (default: %(default)s)")
@@ -48,4 +54,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym train again"))

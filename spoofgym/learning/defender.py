@@ -1,6 +1,6 @@
 """Train a PPO defender.
 
-    python -m spoofgym.learning.defender --scenario foi-drive --steps 3200000 --seed 0 --out runs/d
+    spoofgym train defender --scenario foi-drive --steps 3200000 --seed 0 --out runs/d
 
 Writes into the run folder: what the policy is trained on (``config.json``), the best policy (``policy.npz``, arrays
 only), the validation of every tenth of the run (``validation.json``), TensorBoard logs, and checkpoints from which
@@ -36,8 +36,14 @@ from spoofgym.learning.session import train
 from spoofgym.learning.watch import CHECKPOINTS, Watch, mean_return
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
-from spoofgym.program import program
+from spoofgym.program import moved, program
 from spoofgym.scenarios import make_scenario
+
+EXAMPLES = (
+    "spoofgym train defender --scenario foi-drive --out runs/d",
+    "spoofgym train defender --spoofer pool:ramp:0.2+jump:20 --out runs/e",
+    "spoofgym train defender --resume --out runs/d",
+)
 
 DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
 VALIDATION_FILE = "validation.json"
@@ -48,7 +54,7 @@ VALIDATION_SEED = 2_000_000_000
 def parser() -> argparse.ArgumentParser:
     """The command line; what is not given has no entry."""
     result = Parser(
-        prog="python -m spoofgym.learning.defender",
+        prog="spoofgym train defender", examples=EXAMPLES,
         description="Train a PPO defender against a population of spoofers.",
         argument_default=argparse.SUPPRESS,
     )
@@ -249,4 +255,4 @@ def _validation_world(config: DefenderConfig) -> World:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym train defender"))

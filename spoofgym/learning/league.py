@@ -1,7 +1,7 @@
 """Play a league: both sides learn against each other, and the table says who can be exploited by how much.
 
-    python -m spoofgym.learning.league --scenario foi-drive --out runs/league
-    python -m spoofgym.learning.league --scenario foi-drive --payoff beyond:50 --rounds 3 --out runs/beyond
+    spoofgym train league --scenario foi-drive --out runs/league
+    spoofgym train league --scenario foi-drive --payoff beyond:50 --rounds 3 --out runs/beyond
 
 The league begins with scripted and optimal spoofers and with every classical defender. Each round fills the payoff
 matrix, solves it, and trains a best response of each side to the other's mixture; those that gain are taken in. The
@@ -29,7 +29,7 @@ from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import MORE_GAMES, League, LeagueSettings
 from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WITHOUT_ALARM, WORLD_DETECTORS, keeps_within, tuned_for
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -39,13 +39,18 @@ SPOOFERS = (
     *("ramp:0.1", "ramp:0.2", "ramp:0.5", "ramp:1", "ramp:2", "jump:20", "training"),
     *("unseen:4", "unseen:16", "unseen:64"),
 )
+
+EXAMPLES = (
+    "spoofgym train league --scenario foi-drive --out runs/league",
+    "spoofgym train league --payoff beyond:50 --rounds 3 --out runs/beyond",
+)
 YARDSTICKS = ("always-use", "always-exclude")
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     description = "Let both sides learn against each other, and compare all."
-    result = Parser(prog="python -m spoofgym.learning.league", description=description)
+    result = Parser(prog="spoofgym train league", examples=EXAMPLES, description=description)
     add = result.add_argument
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
     add("--payoff", default="error", metavar="SPEC", help="error, error:CAP or beyond:LIMIT (default: %(default)s)")
@@ -164,4 +169,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym train league"))

@@ -232,7 +232,7 @@ class RunFolder:
     @property
     def command(self) -> str:
         """The command that goes on with this run."""
-        return f"python -m {self._program} --resume --out {shlex.quote(str(self.path))}"
+        return f"spoofgym train {self._program.rpartition('.')[2]} --resume --out {shlex.quote(str(self.path))}"
 
 
 def given_options(options: argparse.Namespace) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Train a PPO spoofer.
 
-    python -m spoofgym.learning.spoofer --scenario liu-flight --detector snapshot --knowledge shadow --out runs/x
-    python -m spoofgym.learning.spoofer --scenario foi-drive --defender "snapshot > px4-auto" --out runs/y
+    spoofgym train spoofer --scenario liu-flight --detector snapshot --knowledge shadow --out runs/x
+    spoofgym train spoofer --scenario foi-drive --defender snapshot/px4-auto --out runs/y
 
 Writes into the run folder: what the policy is trained on (``config.json``), the policy (``policy.npz``, arrays only),
 TensorBoard logs, and checkpoints from which ``--resume`` goes on. Ctrl-C stops after the present step and leaves a
@@ -32,13 +32,20 @@ from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, Ru
 from spoofgym.learning.session import train
 from spoofgym.learning.watch import Watch, mean_return
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.program import program
+from spoofgym.program import moved, program
+
+EXAMPLES = (
+    "spoofgym train spoofer --scenario liu-flight --knowledge shadow --out runs/x",
+    "spoofgym train spoofer --scenario foi-drive --defender snapshot/px4-auto \\",
+    "  --out runs/y",
+    "spoofgym train spoofer --resume --out runs/x",
+)
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line; what is not given has no entry."""
     result = Parser(
-        prog="python -m spoofgym.learning.spoofer",
+        prog="spoofgym train spoofer", examples=EXAMPLES,
         description="Train a PPO spoofer against a detector on a real INS/GNSS filter.",
         argument_default=argparse.SUPPRESS,
     )
@@ -51,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
     add("--shadow", metavar="SPEC", help="scenario whose filter the spoofer takes for the victim's (default: its own)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
     add("--defender", metavar="SPEC",
-        help="train in the duel, against this defender: 'snapshot > exclude', px4-auto, policy:FOLDER, pool:A+B, ...")
+        help="train in the duel, against this defender: snapshot/exclude, px4-auto, policy:FOLDER, pool:A+B, ...")
     add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
     add("--clean", type=share, help="share of clean games in the duel, which teach a spoofer nothing (default: 0)")
     add_options(result, "runs/spoofer")
@@ -252,4 +259,4 @@ class Training:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym train spoofer"))

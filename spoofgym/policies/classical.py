@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
+from spoofgym.detectors import DETECTORS
+from spoofgym.responses import RESPONSES
 from spoofgym.specification import Specification
 
 SEPARATOR = " > "
+SLASH = "/"
+"""May stand for the separator: a shell takes ``>`` for a redirection."""
 WORLD_DETECTORS = (
     "snapshot",
     "windowed:n=5",
@@ -79,7 +84,7 @@ TUNED = {
         ClassicalDefender("tuned-onset", "signed-mean:n=10", "onset-depth:reuse=12", True),
     ],
 }
-"""The best of the grid on 4,000 games of each scenario's training attacks: ``python -m spoofgym.studies.tune``."""
+"""The best of the grid on 4,000 games of each scenario's training attacks: ``spoofgym tune``."""
 
 
 def grid() -> list[ClassicalDefender]:
@@ -111,15 +116,34 @@ def tuned_for(scenario: str) -> list[ClassicalDefender]:
     return TUNED.get(scenario, TUNED["foi-drive"])
 
 
+def watcher_and_response(text: str) -> tuple[str, str] | None:
+    """The specifications of a detector and of the response to its alarm; None where a text spells no such pair.
+
+    ``detector > response`` is one, and ``detector/response``. Slashes within the detector, which stand for commas in a
+    part of it, are told from this one by the name of a response that follows it.
+    """
+    detector, separator, response = (part.strip() for part in text.partition(SEPARATOR.strip()))
+    if separator:
+        return detector, response
+    if re.split("[:,/]", text.strip(), maxsplit=1)[0].strip() not in DETECTORS:
+        return None
+    for slash in (place for place, letter in enumerate(text) if letter == SLASH):
+        rest = text[slash + 1 :].strip()
+        if re.split("[:,]", rest, maxsplit=1)[0].strip() in RESPONSES:
+            return text[:slash].strip(), rest
+    return None
+
+
 def parse(text: str) -> ClassicalDefender:
-    """The defender that ``detector > response`` spells.
+    """The defender that ``detector > response`` or ``detector/response`` spells.
 
     Raises:
         ValueError: the text is not of this form.
     """
-    detector, separator, response = (part.strip() for part in text.partition(SEPARATOR.strip()))
-    if not separator or not detector or not response:
-        raise ValueError(f"a defender is spelled 'detector > response', e.g. 'snapshot > exclude', got {text!r}")
+    parts = watcher_and_response(text)
+    if parts is None or not all(parts):
+        raise ValueError(f"a defender is spelled detector/response, e.g. snapshot/exclude, got {text!r}")
+    detector, response = parts
     Specification.parse(detector)
     Specification.parse(response)
     return ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import spoofgym
 from spoofgym.policies.learned import POLICY_FILE
+from spoofgym.validation import nearest
 
 AGENTS = "agents"
 POLICY = "policy:"
@@ -36,7 +37,7 @@ def published_folder(name: str) -> Path:
     """
     names = published_names()
     if name not in names:
-        raise ValueError(f"no published agent is named {name!r}; {_listed(names)}")
+        raise ValueError(f"no published agent is named {name!r}{nearest(name, names) or ';'} {_listed(names)}")
     return agents_folder() / name
 
 
@@ -56,7 +57,7 @@ def policy_folder(text: str) -> Path:
         return agents_folder() / given
     if not Path(given).is_dir():
         kind = "run folder" if os.sep in given else "run folder and no published agent"
-        raise ValueError(f"{given!r} is no {kind}; {_listed(names)}")
+        raise ValueError(f"{given!r} is no {kind}{nearest(given, names) or ';'} {_listed(names)}")
     return Path(given)
 
 

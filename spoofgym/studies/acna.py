@@ -1,6 +1,6 @@
 """The parameter study of ACNA (Song 2021, section 4.3): windows and thresholds of both tests, in closed loop.
 
-``python -m spoofgym.studies.acna`` plays the robot under the paper's jump and slow-change attacks with every
+``spoofgym study acna`` plays the robot under the paper's jump and slow-change attacks with every
 pair of window and threshold, each test alone, and prints what the best and the published pairs give. An alarm leaves
 the fix out, so that the auxiliary position runs on, as the paper's steps 1 to 8 say. ``--figure FILE`` draws the
 rates over the thresholds; ``--json -`` prints JSON alone.
@@ -37,11 +37,16 @@ from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.figures import new_figure
 from spoofgym.navigation.facts import ODOMETER
 from spoofgym.navigation.interface import Demands, Epoch
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.responses.exclude import Exclude
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+
+EXAMPLES = (
+    "spoofgym study acna --runs 10",
+    "spoofgym study acna --figure acna.png --json rows.json",
+)
 
 TESTS = ("jump", "slow")
 ATTACKS = {"jump": "jump:onset=150", "slow": "slow-change:onset=150"}
@@ -230,7 +235,7 @@ def draw(grids: dict[str, Rates], path: Path) -> None:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.studies.acna", description=main.__doc__)
+    result = Parser(prog="spoofgym study acna", examples=EXAMPLES, description="Study windows and thresholds of ACNA.")
     add = result.add_argument
     add("--scenario", default="song-robot", help="with an odometer (default: %(default)s)")
     add("--runs", type=count, default=10, help="per pair (default: %(default)s)")
@@ -258,7 +263,7 @@ def _report(scenario: str, runs: int, seed: int, grids: dict[str, Rates]) -> dic
 
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Study windows and thresholds of ACNA: a table, and JSON and a figure where they are asked for."""
+    """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     common = (options.runs, options.seed)
     grids = {test: study(options.scenario, test, *common) for test in TESTS}
@@ -284,4 +289,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym study acna"))

@@ -1,9 +1,9 @@
 """The published agents: a table of what they are worth, and whether that still holds.
 
-    python -m spoofgym.studies.agents                       # the table of the cards
-    python -m spoofgym.studies.agents --check               # every agent plays again
-    python -m spoofgym.studies.agents NAME --check --games 1000
-    python -m spoofgym.studies.agents --write agents/README.md
+    spoofgym agents                       # the table of the cards
+    spoofgym agents --check               # every agent plays again
+    spoofgym agents NAME --check --games 1000
+    spoofgym agents --write agents/README.md
 
 With ``--check`` each agent plays the games of its card again. A score holds where the intervals of both overlap; with
 as many games as the card and on the same kind of machine the numbers are equal. The exit status is 1 where one does not
@@ -25,16 +25,21 @@ from spoofgym.evaluation.agent_scores import agent_scores
 from spoofgym.policies.card import Card, Score, read_card
 from spoofgym.policies.learned import load_policy
 from spoofgym.policies.published import policy_folder, published_names
-from spoofgym.program import FAILURE, program
+from spoofgym.program import FAILURE, moved, program
 from spoofgym.studies.pages import put_table
 
-BEGIN, END = "<!-- the table of `python -m spoofgym.studies.agents --write` -->", "<!-- end of the table -->"
+EXAMPLES = (
+    "spoofgym agents",
+    "spoofgym agents --check --games 1000",
+)
+
+BEGIN, END = "<!-- the table of `spoofgym agents --write` -->", "<!-- end of the table -->"
 COLUMNS = ("agent", "role", "scenario", "knows", "opponent", "score")
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.studies.agents", description="What the published agents are worth.")
+    result = Parser(prog="spoofgym agents", examples=EXAMPLES, description="What the published agents are worth.")
     add = result.add_argument
     add("agents", metavar="NAME", nargs="*", help="published agents or folders of agents (default: all published)")
     add("--check", action="store_true", help="let each play again, and compare with its card")
@@ -121,4 +126,4 @@ def write_table(page: Path, cards: Sequence[Card]) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym agents"))

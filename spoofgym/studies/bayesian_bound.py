@@ -1,6 +1,6 @@
 """What no defender can do better: the Bayesian who knows the population of attacks, beside defenders in the same games.
 
-    python -m spoofgym.studies.bayesian_bound --scenario foi-drive --population training --games 500 --json bound.json
+    spoofgym bound bayes --scenario foi-drive --population training --games 500 --json bound.json
 
 Defenders of the table are the tuned ones of the scenario and two yardsticks, or those that ``--defender`` names. A run
 that was stopped goes on with the same command. ``docs/bounds.md`` says what the bound is.
@@ -26,8 +26,13 @@ from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.evaluation.engine import make_engine
 from spoofgym.optimum.bayes import POPULATION_SHAPES, RESOLUTIONS
 from spoofgym.policies.classical import SEPARATOR, WORLD_DETECTORS, tuned_for
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.scenarios import make_scenario
+
+EXAMPLES = (
+    "spoofgym bound bayes --scenario foi-drive --population training",
+    "spoofgym bound bayes --games 100 --defender tuned-onset --json bound.json",
+)
 
 YARDSTICKS = ("always-use", "always-exclude")
 
@@ -35,7 +40,7 @@ YARDSTICKS = ("always-use", "always-exclude")
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
-        prog="python -m spoofgym.studies.bayesian_bound", description="Bound what defenders lose to a population."
+        prog="spoofgym bound bayes", examples=EXAMPLES, description="Bound what defenders lose to a population."
     )
     add = result.add_argument
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
@@ -111,4 +116,4 @@ def _shown(values: dict[str, Any], name: str) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym bound bayes"))

@@ -1,11 +1,11 @@
 """Play spoofgym-bench v1: fixed opponents, seeds and numbers of games; scores with intervals, and one summary.
 
-    python -m spoofgym.studies.benchmark attack ramp:0.5
-    python -m spoofgym.studies.benchmark defend "snapshot > exclude" --json result.json
-    python -m spoofgym.studies.benchmark attack policy:runs/s0 policy:runs/s1 policy:runs/s2   # seeds of one method
-    python -m spoofgym.studies.benchmark defend policy:runs/d --tasks foi-drive
-    python -m spoofgym.studies.benchmark table --write docs/benchmark.md
-    python -m spoofgym.studies.benchmark references attack
+    spoofgym benchmark attack ramp:0.5
+    spoofgym benchmark defend snapshot/exclude --json result.json
+    spoofgym benchmark attack policy:runs/s0 policy:runs/s1 policy:runs/s2   # seeds of one method
+    spoofgym benchmark defend policy:runs/d --tasks foi-drive
+    spoofgym benchmark table --write docs/benchmark.md
+    spoofgym benchmark references attack
 
 A player is spelled as everywhere: an attack or a response, ``detector > response``, ``policy:NAME`` or
 ``policy:FOLDER``. Games are kept in a folder, so that a program that was stopped goes on with the same command. The
@@ -31,7 +31,7 @@ from spoofgym.evaluation.benchmark_play import Matches
 from spoofgym.evaluation.benchmark_report import measure, references
 from spoofgym.evaluation.benchmark_v1 import V1
 from spoofgym.evaluation.engine import Engine, Notify, make_engine
-from spoofgym.program import FAILURE, do_all, give_json, program
+from spoofgym.program import FAILURE, do_all, give_json, moved, program
 from spoofgym.studies.benchmark_page import page_results, write_rows
 from spoofgym.studies.benchmark_presentation import (
     agrees,
@@ -41,6 +41,12 @@ from spoofgym.studies.benchmark_presentation import (
     references_table,
     report_tables,
     write_page,
+)
+
+EXAMPLES = (
+    "spoofgym benchmark attack ramp:0.5",
+    "spoofgym benchmark defend snapshot/exclude --tasks foi-drive",
+    "spoofgym benchmark attack policy:runs/s0 policy:runs/s1 --json result.json",
 )
 
 TABLE, REFERENCES = "table", "references"
@@ -54,7 +60,7 @@ HELP = {
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.studies.benchmark", description=f"Play {V1.name} ({V1.digest}).")
+    result = Parser(prog="spoofgym benchmark", examples=EXAMPLES, description=f"Play {V1.name} ({V1.digest}).")
     commands = result.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
     for name, told in HELP.items():
         command = commands.add_parser(name, help=told, description=told[0].upper() + told[1:] + ".")
@@ -130,4 +136,4 @@ def _give(tables: Sequence[Table], report: dict[str, Any], destination: Any) -> 
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym benchmark"))

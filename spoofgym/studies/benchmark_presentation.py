@@ -14,7 +14,7 @@ from spoofgym.studies.pages import around, put_table
 
 MARKS = {
     track: (
-        f"<!-- the table `{track}` of `python -m spoofgym.studies.benchmark table --write` -->",
+        f"<!-- the table `{track}` of `spoofgym benchmark table --write` -->",
         f"<!-- end of the table `{track}` -->",
     )
     for track in (ATTACK, DEFEND)

@@ -1,6 +1,6 @@
 """Bound the value of the duel from below, against a spoofer that draws its pull.
 
-    python -m spoofgym.studies.duel_bound --scenario foi-drive --payoff error --payoff beyond:50
+    spoofgym bound duel --scenario foi-drive --payoff error --payoff beyond:50
 
 Prints what no defender can keep each payoff below. ``docs/bounds.md`` says what the bound is.
 """
@@ -21,9 +21,14 @@ from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.gaussian_spoofer import Loss, LowerBound, beyond_loss, error_loss, lower_bound
 from spoofgym.optimum.pull_process import drift_pull, unseen_pull
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+
+EXAMPLES = (
+    "spoofgym bound duel --scenario foi-drive",
+    "spoofgym bound duel --payoff error --payoff beyond:50 --json -",
+)
 
 DRIFTS = (1.5, 2.0, 3.0, 4.0)
 UNSEEN = (2.0, 3.0, 4.0, 6.0, 9.0)
@@ -32,7 +37,9 @@ Z95 = 1.96
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.studies.duel_bound", description="Bound the value of the duel from below.")
+    result = Parser(
+        prog="spoofgym bound duel", description="Bound the value of the duel from below.", examples=EXAMPLES
+    )
     add = result.add_argument
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
     add("--payoff", action="append", metavar="SPEC",
@@ -123,4 +130,4 @@ def bound_table(report: dict[str, Any]) -> Table:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym bound duel"))

@@ -1,7 +1,7 @@
 """Export the policy of a run folder as an agent that others can use: policy, card and recipe.
 
-    python -m spoofgym.studies.export runs/x agents/my-spoofer
-    python -m spoofgym.studies.export runs/d my-defender --onnx
+    spoofgym export runs/x agents/my-spoofer
+    spoofgym export runs/d my-defender --onnx
 
 The agent is played in its own environment first, and the card tells what it is worth. Whoever gets the folder names it
 as ``policy:FOLDER``. The folder holds arrays and text only; loading it runs nothing. ``--onnx`` adds ``policy.onnx``
@@ -37,7 +37,12 @@ from spoofgym.policies.learned import (
 )
 from spoofgym.policies.published import policy_folder
 from spoofgym.policies.recipe import Recipe
-from spoofgym.program import program
+from spoofgym.program import moved, program
+
+EXAMPLES = (
+    "spoofgym export runs/x my-spoofer",
+    "spoofgym export runs/d my-defender --onnx",
+)
 
 OPTIONS = {
     SPOOFER: (
@@ -51,7 +56,7 @@ OPTIONS = {
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.studies.export", description="Export a trained policy as an agent.")
+    result = Parser(prog="spoofgym export", examples=EXAMPLES, description="Export a trained policy as an agent.")
     add = result.add_argument
     add("run", metavar="RUN", help="run folder of a training")
     add("out", metavar="OUT", type=Path, help="folder of the agent; its name is the agent's")
@@ -167,4 +172,4 @@ def _commit() -> str | None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym export"))

@@ -1,6 +1,6 @@
 """Whether thresholds that were calibrated in the linear fidelity keep their ARL₀ in the strapdown fidelity.
 
-    python -m spoofgym.studies.fidelity_of_thresholds --scenario liu-flight --arl0 1e3 1e4
+    spoofgym study fidelity-of-thresholds --scenario liu-flight --arl0 1e3 1e4
 
 Each threshold is found in the linear fidelity, as games find it. Its ARL₀ is then measured in both fidelities, on clean
 runs with noise of their own.
@@ -22,9 +22,13 @@ from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+
+EXAMPLES = (
+    "spoofgym study fidelity-of-thresholds --scenario liu-flight --arl0 1e3 1e4",
+)
 
 NEEDING_SIMULATION = ("acceleration", "bias-range", "growing-window", "relative-motion")
 """They look at the run, and not only at its innovations: no white noise calibrates them."""
@@ -100,7 +104,7 @@ def _line(row: dict[str, Any]) -> str:
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
-        prog="python -m spoofgym.studies.fidelity_of_thresholds",
+        prog="spoofgym study fidelity-of-thresholds", examples=EXAMPLES,
         description="ARL0 in both fidelities of thresholds that were calibrated in the linear one.",
     )
     add = result.add_argument
@@ -129,4 +133,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym study fidelity-of-thresholds"))

@@ -2,13 +2,14 @@
 
 The covariance P depends on the trajectory and not on the signals (Liu 2018): a spoofer drags the position out of K σ
 while σ stays what it was. A level by solution separation rests on a coasting that no signal of the last n epochs has
-touched (Kujur 2024). ``python -m spoofgym.studies.integrity`` plays the flight of the latter clean and with
+touched (Kujur 2024). ``spoofgym integrity`` plays the flight of the latter clean and with
 replicas of the true signals that climb slowly, all satellites alike, and prints a table; ``--figure FILE`` draws
 Stanford diagrams of both levels.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,12 +25,17 @@ from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
 from spoofgym.navigation.tight.shared_gains import TightNavigator
-from spoofgym.program import program
+from spoofgym.program import moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 from spoofgym.specification import spell
 from spoofgym.studies.stanford import draw_side_by_side
+
+EXAMPLES = (
+    "spoofgym integrity --runs 50",
+    "spoofgym integrity --figure stanford.png",
+)
 
 HORIZON = 2400
 """Epochs of half a second: 20 minutes."""
@@ -182,14 +188,23 @@ def draw(flight: Flight, replica: Replica, path: Path) -> None:
     draw_side_by_side(diagrams, path, f"Replica of the true signals that climbs at {replica.words}: vertical error")
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym integrity",
+        description="Compare protection levels from P and from solution separation, clean and spoofed.",
+        examples=EXAMPLES,
+    )
+    result.add_argument("--runs", type=count, default=200, help="of each replica (default: %(default)s)")
+    add_seed(result, "run 0")
+    add_figure(result)
+    return result
+
+
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compare protection levels from P and from solution separation, clean and spoofed."""
-    parser = Parser(prog="python -m spoofgym.studies.integrity", description=main.__doc__)
-    parser.add_argument("--runs", type=count, default=200, help="of each replica (default: %(default)s)")
-    add_seed(parser, "run 0")
-    add_figure(parser)
-    options = parser.parse_args(arguments)
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
     print(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")
     print(
         "| signals | level and alarm | level, m | misleading information | integrity failure | available | in alarm |"
@@ -205,4 +220,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym integrity"))

@@ -1,11 +1,12 @@
 """What a reset is worth to a patient spoofer: it jumps beyond the gate, waits until the filter gives in, and drags off.
 
-``python -m spoofgym.studies.patient_spoofer`` prints a table of responses, and draws the figure of the page on
+``spoofgym study patient-spoofer`` prints a table of responses, and draws the figure of the page on
 responses with ``--figure FILE``.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.figures import new_figure
 from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Clock
-from spoofgym.program import program
+from spoofgym.program import moved, program
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
@@ -40,6 +41,10 @@ RESPONSES = (
     "px4-dead-reckoning",
     "exclude-and-backtrack:20",
     "onset-depth",
+)
+
+EXAMPLES = (
+    "spoofgym study patient-spoofer --runs 100 --figure patient.png",
 )
 DRAWN = ("px4-auto", "ardupilot-clip", "px4-dead-reckoning", "exclude-and-backtrack:20")
 COLOURS = ("#c1272d", "#e08e0b", "#2a6fbb", "#2e8540")
@@ -163,14 +168,23 @@ def draw(courses: dict[str, Course], path: Path) -> None:
     files.write_figure(path, figure)
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym study patient-spoofer",
+        description="Play a patient spoofer against responses.",
+        examples=EXAMPLES,
+    )
+    result.add_argument("--runs", type=count, default=400, help="per response (default: %(default)s)")
+    add_seed(result, "run 0")
+    add_figure(result)
+    return result
+
+
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Play a patient spoofer against responses: a table, and a figure where one is asked for."""
-    parser = Parser(prog="python -m spoofgym.studies.patient_spoofer", description=main.__doc__)
-    parser.add_argument("--runs", type=count, default=400, help="per response (default: %(default)s)")
-    add_seed(parser, "run 0")
-    add_figure(parser)
-    options = parser.parse_args(arguments)
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
     courses = {response: play(response, options.runs, options.seed) for response in RESPONSES}
     print(f"{PatientSpoofer(onset=ONSET).name} on {SCENARIO}, {options.runs} runs from seed {options.seed}\n")
     print("| response | final error, m | greatest error, m | reset | first reset | spoofed fixes used |")
@@ -183,4 +197,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym study patient-spoofer"))

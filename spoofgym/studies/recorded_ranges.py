@@ -1,18 +1,23 @@
 """Loosely and tightly coupled filters side by side on a drive whose log has raw ranges, clean and pulled north.
 
-``python -m spoofgym.studies.recorded_ranges PATH`` prints two tables: the filters on the clean drive, and games in
+``spoofgym study recorded-ranges PATH`` prints two tables: the filters on the clean drive, and games in
 which all ranges (or the fixes made from them) are pulled as one position.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from typing import Any
 
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.evaluation.recorded_ranges import side_by_side
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
+
+EXAMPLES = (
+    "spoofgym study recorded-ranges FOLDER --json out.json",
+)
 
 
 def _number(value: float | None, digits: int) -> str:
@@ -57,13 +62,22 @@ def tables(report: dict[str, Any]) -> list[str]:
     return lines
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym study recorded-ranges",
+        description="Filters side by side on a drive with raw ranges, clean and pulled.",
+        examples=EXAMPLES,
+    )
+    result.add_argument("path", metavar="PATH", help="folder of a log with ranges.csv and ephemeris.csv")
+    add_json(result)
+    return result
+
+
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Filters side by side on a drive with raw ranges, clean and pulled."""
-    parser = Parser(prog="python -m spoofgym.studies.recorded_ranges", description=main.__doc__)
-    parser.add_argument("path", metavar="PATH", help="folder of a log with ranges.csv and ephemeris.csv")
-    add_json(parser)
-    options = parser.parse_args(arguments)
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
     report = side_by_side(options.path)
     out = sys.stderr if options.json == STDOUT else sys.stdout
     do_all(lambda: print("\n".join(tables(report)), file=out), lambda: give_json(report, options.json))
@@ -71,4 +85,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym study recorded-ranges"))

@@ -1,11 +1,12 @@
 """What each guard of the self-tuning filter cures, in figures.
 
-``python -m spoofgym.studies.self_tuning`` plays the flight of Shadmehri and Mahboobi Esfanjani (2025) clean and
+``spoofgym study self-tuning`` plays the flight of Shadmehri and Mahboobi Esfanjani (2025) clean and
 under their 3 m/s ramp, under each guard and with both kinds of receiver noise, and prints a table for each noise.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from collections.abc import Sequence
@@ -19,11 +20,16 @@ from spoofgym.command_line import Parser, add_seed, count
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.loose.adaptation import GUARDS
 from spoofgym.navigation.loose.adaptive import AdaptiveNavigator
-from spoofgym.program import program
+from spoofgym.program import moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.shadmehri_flight import NOISES, SIGMA
 from spoofgym.simulation import Simulation
 from spoofgym.specification import spell
+
+EXAMPLES = (
+    "spoofgym study self-tuning --runs 100",
+    "spoofgym study self-tuning --rate 1 --guards hold",
+)
 
 ONSET, END = 20.0, 25.0
 """The paper's attack, s."""
@@ -139,17 +145,26 @@ def _detection(course: Course, attacked: Flags, kept: Flags, threshold: float) -
     return f"{100.0 * detected.mean():.0f} %, {np.median(latency):.1f} s"
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym study self-tuning",
+        description="Play the self-tuning filter clean and under a ramp, with each guard and both noises.",
+        examples=EXAMPLES,
+    )
+    result.add_argument("--runs", type=count, default=400, help="per filter and noise (default: %(default)s)")
+    add_seed(result, "run 0")
+    result.add_argument("--window", type=count, default=50, help="w, fixes (default: %(default)s)")
+    result.add_argument("--rate", type=float, default=3.0, help="of the ramp, m/s per axis (default: %(default)s)")
+    result.add_argument("--guards", nargs="+", choices=GUARDS, metavar="GUARD", default=list(GUARDS),
+                        help=f"of the adaptation: {', '.join(GUARDS)} (default: every one)")
+    return result
+
+
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Play the self-tuning filter clean and under a ramp, with each guard and both noises, and print tables."""
-    parser = Parser(prog="python -m spoofgym.studies.self_tuning", description=main.__doc__)
-    parser.add_argument("--runs", type=count, default=400, help="per filter and noise (default: %(default)s)")
-    add_seed(parser, "run 0")
-    parser.add_argument("--window", type=count, default=50, help="w, fixes (default: %(default)s)")
-    parser.add_argument("--rate", type=float, default=3.0, help="of the ramp, m/s per axis (default: %(default)s)")
-    parser.add_argument("--guards", nargs="+", choices=GUARDS, metavar="GUARD", default=list(GUARDS),
-                        help=f"of the adaptation: {', '.join(GUARDS)} (default: every one)")
-    options = parser.parse_args(arguments)
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
     for noise in NOISES:
         print(f"noise {noise}, w = {options.window}, {options.rate:g} m/s, {options.runs} runs\n")
         print(
@@ -165,4 +180,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym study self-tuning"))

@@ -1,7 +1,7 @@
 """Thresholds of detectors in a scenario, at several average run lengths between false alarms.
 
-    python -m spoofgym.studies.thresholds --scenario liu-flight --arl0 1e3 1e4 1e5
-    python -m spoofgym.studies.thresholds --detector cusum --detector ewma --json -
+    spoofgym thresholds --scenario liu-flight --arl0 1e3 1e4 1e5
+    spoofgym thresholds --detector cusum --detector ewma --json -
 
 A threshold that theory gives has an ARL₀ without an interval. What was found is kept on disk (`calibration_cache`).
 """
@@ -18,9 +18,14 @@ from spoofgym.command_line import STDOUT, Parser, above_one, add_json
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.report import SCHEMA_VERSION
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+
+EXAMPLES = (
+    "spoofgym thresholds --scenario liu-flight --arl0 1e3 1e4 1e5",
+    "spoofgym thresholds --detector cusum --detector ewma --json -",
+)
 
 DEFAULT_ARL0S = (1e3, 1e4, 1e5)
 
@@ -72,7 +77,7 @@ def fitting(scenario: Scenario) -> list[str]:
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
-        prog="python -m spoofgym.studies.thresholds",
+        prog="spoofgym thresholds", examples=EXAMPLES,
         description="Thresholds of detectors at several average run lengths between false alarms.",
     )
     add = result.add_argument
@@ -96,4 +101,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym thresholds"))

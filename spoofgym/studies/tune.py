@@ -1,6 +1,6 @@
 """Tune the classical defenders on the attacks of the training population.
 
-    python -m spoofgym.studies.tune --scenario foi-drive --json out.json
+    spoofgym tune --scenario foi-drive --json out.json
 
 Plays every defender of the grid (`spoofgym.policies.classical.grid`: detector x depth or estimated onset x epochs until
 re-use) on the same games and prints the best. `spoofgym.policies.classical.TUNED` holds what it found.
@@ -18,8 +18,13 @@ from rich.table import Table
 from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, add_threads, count
 from spoofgym.console import console, show
 from spoofgym.evaluation.tuning import tuning_report
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.scenarios import make_scenario
+
+EXAMPLES = (
+    "spoofgym tune --scenario foi-drive",
+    "spoofgym tune --scenario liu-flight:horizon=250,imu=tactical --json tuned.json",
+)
 
 SEED = 1_000_000_000
 """Of game 0: none of these games is one of a training, a validation or an evaluation."""
@@ -27,7 +32,7 @@ SEED = 1_000_000_000
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    result = Parser(prog="python -m spoofgym.studies.tune", description="Tune the classical defenders.")
+    result = Parser(prog="spoofgym tune", examples=EXAMPLES, description="Tune the classical defenders.")
     add = result.add_argument
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
     add("--episodes", type=count, default=4000, help="games of each defender (default: %(default)s)")
@@ -67,4 +72,4 @@ def tuning_table(report: dict[str, Any], episodes: int) -> Table:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym tune"))

@@ -1,6 +1,6 @@
 """What it costs a spoofer to take the victim for another one: `spoofgym.evaluation.wrong_shadow`, as a program.
 
-python -m spoofgym.studies.wrong_shadow --attacker runs/x --json out.json
+spoofgym study wrong-shadow --attacker runs/x --json out.json
 """
 
 from __future__ import annotations
@@ -22,10 +22,15 @@ from spoofgym.evaluation.wrong_shadow import check_policies, wrong_shadow_report
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.published import policy_folder
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.notes import tell_what_is_new
 from spoofgym.studies.presentation import number
+
+EXAMPLES = (
+    "spoofgym study wrong-shadow --attacker runs/x",
+    "spoofgym study wrong-shadow --episodes 500 --json out.json",
+)
 
 
 def wrong_shadow_table(report: dict[str, Any]) -> Table:
@@ -65,7 +70,7 @@ def _half(interval: list[float]) -> float:
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
-        prog="python -m spoofgym.studies.wrong_shadow",
+        prog="spoofgym study wrong-shadow", examples=EXAMPLES,
         description="What a spoofer's score loses when its shadow filter is not the victim's.",
     )
     add = result.add_argument
@@ -119,4 +124,4 @@ def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym study wrong-shadow"))

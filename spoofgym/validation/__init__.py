@@ -1,7 +1,7 @@
 """Checks of arguments, with one form of message: who, which argument, what is valid, what came."""
 
 from spoofgym.validation.choices import at_most_one, boolean, instance, one_of, text
-from spoofgym.validation.messages import argument, shown, written
+from spoofgym.validation.messages import argument, nearest, shown, written
 from spoofgym.validation.numbers import (
     LARGEST,
     LATEST,
@@ -49,6 +49,7 @@ __all__ = [
     "floats",
     "hour",
     "instance",
+    "nearest",
     "non_negative",
     "non_negatives",
     "one_of",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from spoofgym.validation.messages import message
+from spoofgym.validation.messages import message, nearest
 
 
 def boolean(owner: str, name: str, value: Any) -> bool:
@@ -38,7 +38,8 @@ def one_of(owner: str, name: str, value: Any, valid: tuple[str, ...]) -> str:
         ValueError: it is not.
     """
     if not isinstance(value, str) or value not in valid:
-        raise ValueError(message(owner, name, f"one of {', '.join(valid)}", value))
+        close = nearest(value, valid) if isinstance(value, str) else ""
+        raise ValueError(message(owner, name, f"one of {', '.join(valid)}", value) + close)
     return str(value)
 
 

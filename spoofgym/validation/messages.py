@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 MOST_LETTERS = 100
@@ -22,6 +22,22 @@ def shown(value: object) -> str:
         text = f"a {type(value).__name__} too long to show"
     text = " ".join(text.split())  # a table of numbers takes one line, too
     return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]}..."
+
+
+def nearest(given: str, valid: Iterable[str]) -> str:
+    """The end of a message about a name that is unknown: the valid one that is spelled most like it, if any is.
+
+    Args:
+        given: the unknown name.
+        valid: the names that there are.
+
+    Returns:
+        ``": did you mean 'NAME'?"``, or nothing.
+    """
+    import difflib  # only where a name is wrong
+
+    found = difflib.get_close_matches(given, list(valid), 1)
+    return f": did you mean {found[0]!r}?" if found else ""
 
 
 def limit(number: float) -> str:

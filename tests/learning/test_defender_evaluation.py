@@ -19,7 +19,8 @@ from spoofgym.policies import classical as listed
 from spoofgym.policies.learned import LearnedDefender
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
-from spoofgym.studies import evaluate, tune
+from spoofgym.studies import tune
+from spoofgym.studies.evaluate import defenders as evaluate_defenders
 from tests.learning.runs import DRIVE
 
 pytestmark = pytest.mark.xdist_group("taught defender")  # one worker: the run folder is made once
@@ -79,7 +80,7 @@ def world(monkeypatch):
 
 
 def evaluated(capsys, *arguments):
-    assert evaluate.main(["--scenario", DRIVE, "--threads", "1", *arguments, "--json", "-"]) == 0
+    assert evaluate_defenders.main(["--scenario", DRIVE, "--threads", "1", *arguments, "--json", "-"]) == 0
     return json.loads(capsys.readouterr().out)
 
 
@@ -150,12 +151,12 @@ def test_what_does_not_fit_the_scenario_is_left_out(capsys, monkeypatch):
     monkeypatch.setattr(defenders, "WORLD_DETECTORS", ("snapshot", WINDOWED, SIGNED, relative))
     monkeypatch.setattr(defenders, "PUBLISHED", PUBLISHED + unfit)
     few = ["--scenario", robot, "--threads", "1", "--episodes", "5", "--population", "training"]
-    assert evaluate.main([*few, "--defender", "snapshot > exclude", "--json", "-"]) == 0
+    assert evaluate_defenders.main([*few, "--defender", "snapshot > exclude", "--json", "-"]) == 0
     printed = capsys.readouterr()
     assert json.loads(printed.out)["kinds"] == {**DEFENDERS, "snapshot > exclude": "given"}
     (line,) = [line for line in printed.err.splitlines() if line.startswith("left out")]
     assert line.endswith(f"{robot} does not give what they need: foi-relative-b20 ({relative})")
-    assert evaluate.main([*few, "--defender", f"{relative} > exclude"]) == 2
+    assert evaluate_defenders.main([*few, "--defender", f"{relative} > exclude"]) == 2
     assert "needs inertial solution" in " ".join(capsys.readouterr().err.split())
 
 
@@ -200,7 +201,7 @@ def test_tables_fit_a_terminal_and_a_figure_is_drawn(taught, tmp_path, capsys, m
     monkeypatch.setenv("COLUMNS", "100")
     figure, out = tmp_path / "sub" / "out.png", tmp_path / "out.json"
     arguments = ["--defender", str(taught), "--defender", GIVEN, "--episodes", "12", "--json", str(out)]
-    assert evaluate.main(["--scenario", DRIVE, "--threads", "1", *arguments, "--figure", str(figure)]) == 0
+    assert evaluate_defenders.main(["--scenario", DRIVE, "--threads", "1", *arguments, "--figure", str(figure)]) == 0
     assert figure.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     lines = capsys.readouterr().out.replace(str(tmp_path), "").splitlines()
     assert max(map(len, lines)) <= 100
@@ -218,38 +219,36 @@ def test_tables_fit_a_terminal_and_a_figure_is_drawn(taught, tmp_path, capsys, m
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--defender", "nowhere"], "--defender 'nowhere' is neither a run folder nor 'detector > response'"),
-        (["--defender", "> exclude"], "spelled 'detector > response', e.g. 'snapshot > exclude', got '> exclude'"),
+        (["--defender", "nowhere"], "--defender 'nowhere' is neither a run folder nor detector/response"),
+        (["--defender", "> exclude"], "spelled detector/response, e.g. snapshot/exclude, got '> exclude'"),
         (["--defender", "oracle > exclude"], "unknown detector 'oracle'"),
         (["--defender", "snapshot > pray"], "unknown response 'pray'"),
-        (["--defender", GIVEN, "--attack", "ramp:0.5"], "it goes without --attacker, --attack and --detector"),
-        (["--defender", GIVEN, "--detector", "snapshot"], "it goes without --attacker, --attack and --detector"),
         (["--scenario", "moon", "--defender", GIVEN], "unknown scenario 'moon'"),
     ],
 )
 def test_bad_input_of_an_evaluation_is_told(arguments, message, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert evaluate.main(["--scenario", DRIVE, "--episodes", "2", "--threads", "1", *arguments]) == 2
+    assert evaluate_defenders.main(["--scenario", DRIVE, "--episodes", "2", "--threads", "1", *arguments]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.usefixtures("world")
 def test_policies_that_cannot_be_told_apart_or_do_not_fit(taught, tmp_path, capsys):
     arguments = ["--scenario", DRIVE, "--episodes", "2", "--threads", "1", "--population", "training"]
-    assert evaluate.main([*arguments, "--defender", str(taught), "--defender", str(taught)]) == 2
+    assert evaluate_defenders.main([*arguments, "--defender", str(taught), "--defender", str(taught)]) == 2
     assert "run folders of one name cannot be told apart: short, short" in " ".join(capsys.readouterr().err.split())
 
     policy = LearnedDefender.load(taught)
     folder = tmp_path / "odd"
     shutil.copytree(taught, folder)
     replace(policy, layout=("speed", *policy.layout[1:])).save(folder)
-    assert evaluate.main([*arguments, "--defender", str(folder)]) == 2
+    assert evaluate_defenders.main([*arguments, "--defender", str(folder)]) == 2
     assert "policy 'odd' was trained for another observation: entry 0 was 'speed'" in " ".join(
         capsys.readouterr().err.split()
     )
     weights, biases = ((*parts[:-1], parts[-1][:-1]) for parts in (policy.weights, policy.biases))
     replace(policy, weights=weights, biases=biases).save(folder)
-    assert evaluate.main([*arguments, "--defender", str(folder)]) == 2
+    assert evaluate_defenders.main([*arguments, "--defender", str(folder)]) == 2
     assert "policy 'odd' was trained on 10 depths, the game has 11" in " ".join(capsys.readouterr().err.split())
 
 

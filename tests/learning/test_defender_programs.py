@@ -15,7 +15,8 @@ from spoofgym.learning.defender import VALIDATION_FILE, VALIDATION_SEED
 from spoofgym.learning.run_folder import CHECKPOINT_FILE
 from spoofgym.policies.learned import CONFIG_FILE, POLICY_FILE, LearnedDefender
 from spoofgym.scenarios import make_scenario
-from spoofgym.studies import evaluate, tune
+from spoofgym.studies import tune
+from spoofgym.studies.evaluate import defenders as evaluate_defenders
 from tests.learning.runs import DRIVE, SHORT, STEPS, few_lessons
 
 pytestmark = pytest.mark.xdist_group("taught defender")  # one worker: the run folder is made once
@@ -100,7 +101,7 @@ def test_a_run_that_was_interrupted_at_its_beginning_starts_again(taught, tmp_pa
     with monkeypatch.context() as patch:
         patch.setattr(defender, "begin", interrupted)
         assert defender.main([*SHORT, "--steps", str(STEPS), "--out", str(folder)]) == 130
-    assert "go on with: python -m spoofgym.learning.defender --resume" in capsys.readouterr().err
+    assert "go on with: spoofgym train defender --resume" in capsys.readouterr().err
     LearnedDefender.load(folder)
     assert defender.main(["--resume", "--out", str(folder)]) == 0
     for name in (VALIDATION_FILE, POLICY_FILE):  # on the same seed
@@ -137,7 +138,7 @@ def test_bad_input_is_told_and_nothing_is_written(program, arguments, message, t
         (defender, "--seed", "-1"),
         (defender, "--privileged", "perhaps"),
         (defender, "--fidelity", "cubic"),
-        (evaluate, "--population", "everyone"),
+        (evaluate_defenders, "--population", "everyone"),
         (tune, "--episodes", "none"),
     ],
 )

@@ -8,7 +8,7 @@ import pytest
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.learning import spoofer
 from spoofgym.policies.learned import CONFIG_FILE, LearnedSpoofer
-from spoofgym.studies import evaluate
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 
 SHORT = ["--scenario", "liu-flight:horizon=20", "--threads", "1"]
 
@@ -30,7 +30,7 @@ def test_the_run_folder_keeps_the_memory(run):
 
 def test_it_is_evaluated_in_a_game_with_its_memory(run, capsys):
     """6 sigma of 1000 games: false failure below 1e-8; the filter's noise in the norm adds up to its own size."""
-    assert evaluate.main([*SHORT, "--attacker", str(run), "--episodes", "1000", "--json", "-"]) == 0
+    assert evaluate_spoofers.main([*SHORT, "--attacker", str(run), "--episodes", "1000", "--json", "-"]) == 0
     row = json.loads(capsys.readouterr().out)["rows"][-1]
     assert row["attacker"] == "memory"
     standard_error = (row["ci95_m"][1] - row["ci95_m"][0]) / (2 * 1.96)

@@ -15,7 +15,7 @@ import pytest
 from spoofgym.learning import spoofer
 from spoofgym.policies import baselines
 from spoofgym.policies.learned import CONFIG_FILE, POLICY_FILE, LearnedSpoofer
-from spoofgym.studies import evaluate
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 
 ROW_KEYS = {
     "attacker",
@@ -62,7 +62,7 @@ def report(run):
     """What an evaluation writes to standard output, where nothing else may stand."""
     arguments = ["--attacker", str(run), "--episodes", "2000", "--json", "-", "--attack", "ramp:0.2"]
     with contextlib.redirect_stdout(io.StringIO()) as out:
-        assert evaluate.main([*SHORT, *arguments]) == 0
+        assert evaluate_spoofers.main([*SHORT, *arguments]) == 0
     return json.loads(out.getvalue())
 
 
@@ -91,7 +91,7 @@ def test_exact_score_of_a_policy_agrees_with_simulation(report):
 
 def test_figure_and_table(run, tmp_path, capsys):
     figure = tmp_path / "sub" / "out.png"
-    assert evaluate.main([*SHORT, "--attacker", str(run), "--episodes", "50", "--figure", str(figure)]) == 0
+    assert evaluate_spoofers.main([*SHORT, "--attacker", str(run), "--episodes", "50", "--figure", str(figure)]) == 0
     assert figure.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     table = capsys.readouterr().out
     assert all(name in table for name in [*BASELINES, "short"])
@@ -101,7 +101,7 @@ def test_another_detector_has_no_optimum(capsys, monkeypatch):
     monkeypatch.setattr(baselines, "SEARCH_EPISODES", 50)
     monkeypatch.setattr(baselines, "SEARCH_ROUNDS", 1)
     arguments = ["--scenario", "liu-flight:horizon=8", "--threads", "1", "--detector", "windowed:n=5,threshold=45"]
-    assert evaluate.main([*arguments, "--episodes", "100", "--json", "-"]) == 0
+    assert evaluate_spoofers.main([*arguments, "--episodes", "100", "--json", "-"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["detector"]["arl0"] is None
     assert [row["attacker"] for row in report["rows"]] == BASELINES
@@ -141,10 +141,10 @@ def test_interruption_leaves_a_usable_policy(tmp_path, child):
         (spoofer, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: foi-drive, kujur-flight, liu-flight"),
         (spoofer, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: acceleration, acna, aime"),
         (spoofer, ["--knowledge", "blind", "--action", "innovation"], "knowledge must be 'shadow' or 'full'"),
-        (evaluate, ["--scenario", "liu-flight:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
-        (evaluate, ["--attack", "ramp:-1"], "rate must be a finite number, 0 or more"),
-        (evaluate, ["--attack", "ramp:1,onset=5000"], "lies outside the game"),
-        (evaluate, ["--attacker", "nowhere"], "is no run folder"),
+        (evaluate_spoofers, ["--scenario", "liu-flight:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
+        (evaluate_spoofers, ["--attack", "ramp:-1"], "rate must be a finite number, 0 or more"),
+        (evaluate_spoofers, ["--attack", "ramp:1,onset=5000"], "lies outside the game"),
+        (evaluate_spoofers, ["--attacker", "nowhere"], "is no run folder"),
     ],
 )
 def test_bad_input_is_told_and_nothing_is_written(program, arguments, message, tmp_path, monkeypatch, capsys):
@@ -160,7 +160,7 @@ def test_bad_input_is_told_and_nothing_is_written(program, arguments, message, t
         (spoofer, "--steps", "0"),
         (spoofer, "--steps", "many"),
         (spoofer, "--seed", "-1"),
-        (evaluate, "--figure", "out.gif"),
+        (evaluate_spoofers, "--figure", "out.gif"),
     ],
 )
 def test_arguments_are_checked_at_once(program, option, value, capsys):

@@ -17,7 +17,9 @@ from spoofgym.learning.defender_ppo import DefenderPolicy
 from spoofgym.learning.imitation import Teacher
 from spoofgym.policies import baselines
 from spoofgym.policies.learned import LearnedDefender, LearnedSpoofer
-from spoofgym.studies import evaluate, wrong_shadow
+from spoofgym.studies import wrong_shadow
+from spoofgym.studies.evaluate import defenders as evaluate_defenders
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 
 SCENARIO = "kujur-flight:horizon=44,onset=60"
 WINDOWED = "windowed:n=5,p_fa=1e-4"
@@ -39,7 +41,7 @@ def test_a_spoofer_is_trained_and_evaluated(tmp_path: Path, capsys: Any, monkeyp
     assert "mean clock error" in policy.layout
     arguments = ["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "20", "--threads", "1"]
     capsys.readouterr()
-    assert evaluate.main([*arguments, "--json", "-"]) == 0
+    assert evaluate_spoofers.main([*arguments, "--json", "-"]) == 0
     rows = {row["attacker"]: row for row in json.loads(capsys.readouterr().out)["rows"]}
     assert rows["random"]["detection_probability"] == 1.0
     assert rows["run"]["episodes"] == 20
@@ -67,11 +69,11 @@ def test_a_defender_is_taught_trained_and_evaluated(
     monkeypatch.setattr(defenders, "tuned_for", lambda scenario: [])
     capsys.readouterr()
     arguments = ["--scenario", SCENARIO, "--defender", str(folder), "--episodes", "8", "--threads", "1"]
-    assert evaluate.main([*arguments, "--json", "-"]) == 0
+    assert evaluate_defenders.main([*arguments, "--json", "-"]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert {"run", "never", "always"} <= {row["defender"] for row in rows}
     # a policy that sees ranges has nothing to see in fixes
-    assert evaluate.main(["--scenario", SCENARIO + ",coupling=loose", *arguments[2:]]) == 2
+    assert evaluate_defenders.main(["--scenario", SCENARIO + ",coupling=loose", *arguments[2:]]) == 2
     assert "'separation-bank:n=20' needs ranges to satellites" in told(capsys)
 
 

@@ -2,21 +2,24 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from spoofgym.evaluation import defenders
 from spoofgym.policies import published
 from spoofgym.policies.classical import ClassicalDefender
-from spoofgym.studies import evaluate
+from spoofgym.studies.evaluate import defenders as evaluate_defenders
+from spoofgym.studies.evaluate import recorded as evaluate_recorded
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 from tests.run_folders import defender, spoofer
 from tests.scenarios.test_recorded import write_log
 
 FLIGHT = "liu-flight:horizon=40"
 
 
-def report(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
-    assert evaluate.main(["--scenario", FLIGHT, "--episodes", "8", "--json", "-", *arguments]) == 0
+def report(program: Any, capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    assert program.main(["--scenario", FLIGHT, "--episodes", "8", "--json", "-", *arguments]) == 0
     return json.loads(capsys.readouterr().out)
 
 
@@ -32,14 +35,14 @@ def agents(tmp_path, monkeypatch):
 def test_a_spoofer_is_given_by_its_folder_or_its_name(agents, capsys):
     text = spoofer({"scenario": FLIGHT, "knowledge": "shadow"}, agents / "x")
     spelled = ("--attacker", str(agents / "x")), ("--attacker", text), ("--attacker", "x"), ("--attacker", "policy:x")
-    rows = [report(capsys, *arguments)["rows"][-1] for arguments in spelled]
+    rows = [report(evaluate_spoofers, capsys, *arguments)["rows"][-1] for arguments in spelled]
     assert rows[0]["attacker"] == "x"
     assert rows[1:] == rows[:1] * 3
 
 
 def test_an_attack_tells_what_the_policy_within_it_knows(tmp_path, capsys):
     text = spoofer({"scenario": FLIGHT, "knowledge": "shadow"}, tmp_path / "x")
-    row = report(capsys, "--attack", f"tracking-error:{text}")["rows"][-1]
+    row = report(evaluate_spoofers, capsys, "--attack", f"tracking-error:{text}")["rows"][-1]
     assert (row["attacker"], row["knowledge"]) == (f"tracking-error:{text}", "shadow")
 
 
@@ -52,9 +55,8 @@ def test_a_defender_is_given_by_its_folder_or_its_name_or_as_a_response(agents, 
     pool = "snapshot > pool:exclude+latch"
     found = []
     for given in (str(agents / "d"), text, "d", "policy:d"):
-        all_rows = report(
-            capsys, "--defender", given, "--defender", as_response, "--defender", pool, "--population", "training"
-        )["rows"]
+        asked = [part for each in (given, as_response, pool) for part in ("--defender", each)]
+        all_rows = report(evaluate_defenders, capsys, *asked, "--population", "training")["rows"]
         rows = {name: [row for row in all_rows if row["defender"] == name] for name in ("d", as_response, pool)}
         found.append(rows["d"])
         assert rows[pool]
@@ -64,20 +66,20 @@ def test_a_defender_is_given_by_its_folder_or_its_name_or_as_a_response(agents, 
 
 def test_what_is_no_defender_is_told(tmp_path: Path, capsys):
     for given in ("nowhere", "policy:nowhere"):
-        assert evaluate.main(["--defender", given]) == 2
+        assert evaluate_defenders.main(["--defender", given]) == 2
         error = capsys.readouterr().err
-        assert f"--defender '{given}' is neither a run folder nor 'detector > response': 'nowhere' is no run f" in error
+        assert f"--defender '{given}' is neither a run folder nor detector/response: 'nowhere' is no run f" in error
 
 
 def test_a_policy_attacks_a_recorded_log_that_shows_what_it_was_trained_to_see(tmp_path, capsys):
     """A blind spoofer knows no filter; one with a shadow filter needs a linear model, which a log has not."""
-    log = f"recorded:{write_log(tmp_path / 'log', velocity=False)},horizon=30"
+    log = f"{write_log(tmp_path / 'log', velocity=False)},horizon=30"
     blind, seeing = (
         spoofer({"scenario": FLIGHT, "knowledge": knowledge}, tmp_path / knowledge) for knowledge in ("blind", "shadow")
     )
-    assert evaluate.main(["--scenario", log, "--attack", blind, "--attack", "none", "--json", "-"]) == 0
+    assert evaluate_recorded.main([log, "--attack", blind, "--attack", "none", "--json", "-"]) == 0
     pulled, clean = json.loads(capsys.readouterr().out)["rows"]
     assert pulled["attack"] == blind
     assert pulled["max_error_m"] > clean["max_error_m"]
-    assert evaluate.main(["--scenario", log, "--attack", seeing]) == 2
+    assert evaluate_recorded.main([log, "--attack", seeing]) == 2
     assert "cannot play on scenario" in capsys.readouterr().err

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from spoofgym.studies import evaluate
+from spoofgym.studies.evaluate import matrix
 from spoofgym.studies.matrix_presentation import drawn_curves, ensemble_notes, short_names, values
 
-SHORT = ["--matrix", "--scenario", "liu-flight:horizon=20", "--arl0", "300", "--episodes", "200", "--threads", "1"]
+SHORT = ["--scenario", "liu-flight:horizon=20", "--arl0", "300", "--episodes", "200", "--threads", "1"]
 PARTS = ["--detector", "snapshot", "--detector", "mewma", "--detector", "ensemble:snapshot+mewma", "--attack", "ramp:1"]
 ROW_KEYS = {
     "detector",
@@ -24,7 +24,7 @@ ROW_KEYS = {
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     path = tmp_path_factory.mktemp("matrix") / "out.json"
-    assert evaluate.main([*SHORT, *PARTS, "--json", str(path)]) == 0
+    assert matrix.main([*SHORT, *PARTS, "--json", str(path)]) == 0
     return json.loads(path.read_text())
 
 
@@ -53,13 +53,13 @@ def test_values_stand_at_their_detector_and_attack(report):
 
 
 def test_json_alone_on_stdout(capsys):
-    assert evaluate.main([*SHORT, *PARTS, "--json", "-"]) == 0
+    assert matrix.main([*SHORT, *PARTS, "--json", "-"]) == 0
     assert json.loads(capsys.readouterr().out)["kind"] == "matrix"
 
 
 def test_figures_are_written_and_the_table_fits_a_terminal(tmp_path, capsys):
     figures = ["--figure", str(tmp_path / "heat.png"), "--roc", str(tmp_path / "roc.svg"), "--roc-attack", "ramp:1"]
-    assert evaluate.main([*SHORT, *PARTS, *figures]) == 0
+    assert matrix.main([*SHORT, *PARTS, *figures]) == 0
     assert (tmp_path / "heat.png").stat().st_size > 10_000
     assert (tmp_path / "roc.svg").stat().st_size > 10_000
     printed = capsys.readouterr().out
@@ -72,9 +72,9 @@ def test_figures_are_written_and_the_table_fits_a_terminal(tmp_path, capsys):
 )
 def test_curves_of_the_usual_attack_or_else_of_the_first(attacks, drawn, tmp_path, monkeypatch):
     chosen = []
-    monkeypatch.setattr(evaluate, "curves_figure", lambda report, attack, path: chosen.append(attack))
+    monkeypatch.setattr(matrix, "curves_figure", lambda report, attack, path: chosen.append(attack))
     parts = [part for attack in attacks for part in ("--attack", attack)]
-    assert evaluate.main([*SHORT, "--detector", "snapshot", *parts, "--roc", str(tmp_path / "roc.png")]) == 0
+    assert matrix.main([*SHORT, "--detector", "snapshot", *parts, "--roc", str(tmp_path / "roc.png")]) == 0
     assert chosen == [drawn]
 
 
@@ -89,7 +89,7 @@ def test_points_with_few_clean_alarms_are_not_drawn(report):
 
 def test_curves_need_false_alarms_and_the_rows_are_kept(tmp_path, capsys):
     few = [*SHORT, *PARTS, "--episodes", "15", "--json", str(tmp_path / "out.json"), "--roc", str(tmp_path / "roc.png")]
-    assert evaluate.main(few) == 2
+    assert matrix.main(few) == 2
     assert "raise --episodes" in " ".join(capsys.readouterr().err.split())
     assert json.loads((tmp_path / "out.json").read_text())["episodes"] == 15
 
@@ -97,7 +97,7 @@ def test_curves_need_false_alarms_and_the_rows_are_kept(tmp_path, capsys):
 def test_a_filter_that_breaks_down_is_told(capsys):
     scenario = "shadmehri-flight:filter=self-tuning,noise=markov,guard=none"
     parts = ["--detector", "snapshot:threshold=1e9", "--attack", "ramp:1", "--episodes", "20", "--threads", "1"]
-    assert evaluate.main(["--matrix", "--scenario", scenario, *parts]) == 2
+    assert matrix.main(["--scenario", scenario, *parts]) == 2
     error = " ".join(capsys.readouterr().err.split())
     assert error.startswith("error: run ")
     assert "choose a guard" in error
@@ -106,20 +106,19 @@ def test_a_filter_that_breaks_down_is_told(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--arl0", "300"], "they go with --matrix"),
         ([*SHORT, *PARTS, "--roc", "x.png", "--roc-attack", "ramp:9"], "there are: ramp:1"),
         ([*SHORT, "--detector", "snapshot", "--detector", "snapshot", "--attack", "jump"], "once only"),
         ([*SHORT, "--detector", "snapshoot"], "valid names:"),
-        ([*SHORT, "--defender", "snapshot > exclude"], "no --defender"),
+        (["--attack", "ramp:1", "--shadow", "foi-drive"], "it goes with --attacker"),
     ],
 )
 def test_what_does_not_fit_is_refused(arguments, message, capsys):
-    assert evaluate.main(arguments) == 2
+    assert matrix.main(arguments) == 2
     assert message in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize("arl0", ["1", "nan", "inf", "often"])
 def test_an_impossible_rate_is_refused(arl0, capsys):
     with pytest.raises(SystemExit):
-        evaluate.main(["--matrix", "--arl0", arl0])
+        matrix.main(["--arl0", arl0])
     assert "argument --arl0: expected a" in capsys.readouterr().err

@@ -13,7 +13,9 @@ from spoofgym.evaluation.trained_on import what_is_new
 from spoofgym.policies.learned import CONFIG_FILE, LearnedDefender, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import GRADES
-from spoofgym.studies import evaluate, wrong_shadow
+from spoofgym.studies import wrong_shadow
+from spoofgym.studies.evaluate import defenders as evaluate_defenders
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 
 SCENARIO = "liu-flight:horizon=12"
 
@@ -35,7 +37,7 @@ def notes(text):
 
 
 def test_what_is_trained_on_is_not_told(folder, capsys):
-    assert evaluate.main(["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "4"]) == 0
+    assert evaluate_spoofers.main(["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "4"]) == 0
     assert capsys.readouterr().err == ""
 
 
@@ -50,7 +52,7 @@ def test_what_is_trained_on_is_not_told(folder, capsys):
     ],
 )
 def test_what_is_new_is_told_once(folder, options, words, capsys):
-    assert evaluate.main([*options, "--attacker", str(folder), "--episodes", "4", "--json", "-"]) == 0
+    assert evaluate_spoofers.main([*options, "--attacker", str(folder), "--episodes", "4", "--json", "-"]) == 0
     printed = capsys.readouterr()
     json.loads(printed.out)
     (note,) = notes(printed.err)
@@ -95,17 +97,17 @@ def test_a_log_that_is_not_here_is_told_by_its_specification():
 def test_a_name_is_no_markup_in_tables_and_figures(folder, tmp_path, capsys):
     figure = tmp_path / "out.svg"
     arguments = ["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "4", "--figure", str(figure)]
-    assert evaluate.main(arguments) == 0
+    assert evaluate_spoofers.main(arguments) == 0
     assert folder.name in capsys.readouterr().out
     assert figure.is_file()
 
 
 def test_players_are_not_taken_for_each_other(folder, capsys):
-    assert evaluate.main(["--scenario", "foi-drive:horizon=40", "--defender", str(folder)]) == 2
+    assert evaluate_defenders.main(["--scenario", "foi-drive:horizon=40", "--defender", str(folder)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line == f"error: {folder} is the run folder of a spoofer, not of a defender"
     (folder / CONFIG_FILE).write_text(json.dumps({"environment": {"attacks": "training", "detectors": ["snapshot"]}}))
-    for program in (evaluate, wrong_shadow):
+    for program in (evaluate_spoofers, wrong_shadow):
         assert program.main(["--scenario", SCENARIO, "--attacker", str(folder)]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert line == f"error: {folder} is the run folder of a defender, not of a spoofer"

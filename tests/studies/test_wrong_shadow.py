@@ -19,7 +19,8 @@ from spoofgym.optimum import bounded_optimum
 from spoofgym.policies.learned import CONFIG_FILE, LearnedSpoofer
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.imu import GRADES
-from spoofgym.studies import evaluate, wrong_shadow
+from spoofgym.studies import wrong_shadow
+from spoofgym.studies.evaluate import spoofers as evaluate_spoofers
 
 SCENARIO = "liu-flight:horizon=20"
 WIDE, TACTICAL = f"{SCENARIO},sigma=7.4", f"{SCENARIO},imu=tactical"
@@ -150,7 +151,7 @@ def test_a_policy_that_another_detector_has_taught_is_refused(folder, tmp_path, 
 
 def test_evaluation_replaces_the_shadow(folder, evaluation, capsys):
     arguments = ["--scenario", SCENARIO, "--attacker", str(folder), "--episodes", "50", "--threads", "1", "--json", "-"]
-    assert evaluate.main([*arguments, "--shadow", WIDE]) == 0
+    assert evaluate_spoofers.main([*arguments, "--shadow", WIDE]) == 0
     row = json.loads(capsys.readouterr().out)["rows"][-1]
     expected = evaluation.exact(LearnedSpoofer.load(folder).with_shadow(WIDE))
     assert row["exact_undetected_error_m"] == pytest.approx(expected, rel=1e-12)
@@ -169,7 +170,7 @@ def test_training_with_a_wrong_shadow_keeps_it(tmp_path):
     [
         (spoofer, ["--shadow", "liu-flight:horizon=20"], "epochs: 20 instead of 120"),
         (spoofer, ["--shadow", "liu-flight", "--knowledge", "blind"], "a 'blind' spoofer has no shadow filter"),
-        (evaluate, ["--shadow", "liu-flight"], "--shadow replaces the shadow filter of learned spoofers"),
+        (evaluate_spoofers, ["--shadow", "liu-flight"], "--shadow replaces the shadow filter of learned spoofers"),
         (wrong_shadow, ["--detector", "windowed:n=5,threshold=45"], "for a snapshot test on a matched filter only"),
         (wrong_shadow, ["--scenario", "liu-flight:imu=tactical"], "for a snapshot test on a matched filter only"),
         (wrong_shadow, ["--scenario", "foi-drive"], "scenario 'foi-drive' has no option 'sigma'"),

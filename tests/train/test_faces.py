@@ -1,24 +1,26 @@
 """Training programs of a checkout are those of the package, and commands that have moved say where."""
 
-import importlib.util
+import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from spoofgym.cli.commands import COMMANDS, find, groups
+from spoofgym.studies.evaluate.__main__ import new_name
+
 ROOT = Path(__file__).parents[2]
 MOVED = {
-    "train.evaluate": "spoofgym.studies.evaluate",
-    "train.tune": "spoofgym.studies.tune",
-    "train.wrong_shadow": "spoofgym.studies.wrong_shadow",
-    "spoofgym.evaluation.acna_study": "spoofgym.studies.acna",
-    "spoofgym.evaluation.integrity_study": "spoofgym.studies.integrity",
-    "spoofgym.evaluation.patient_spoofer": "spoofgym.studies.patient_spoofer",
-    "spoofgym.evaluation.recorded_ranges": "spoofgym.studies.recorded_ranges",
-    "spoofgym.evaluation.reproduce": "spoofgym.studies.reproduce",
-    "spoofgym.evaluation.self_tuning": "spoofgym.studies.self_tuning",
-    "spoofgym.evaluation.thresholds": "spoofgym.studies.thresholds",
+    "train.evaluate": "evaluate",
+    "train.tune": "tune",
+    "train.wrong_shadow": "study wrong-shadow",
+    "spoofgym.evaluation.acna_study": "study acna",
+    "spoofgym.evaluation.recorded_ranges": "study recorded-ranges",
+    "spoofgym.studies.evaluate": "evaluate spoofers",
+    "spoofgym.studies.duel_bound": "bound duel",
+    "spoofgym.learning.exploit": "exploit",
 }
 
 
@@ -36,5 +38,26 @@ def test_a_face_is_the_program_of_the_package(name):
 def test_a_moved_command_says_where_it_is(old, new):
     result = run(old, "--scenario", "liu-flight")
     assert (result.returncode, result.stdout) == (2, "")
-    assert result.stderr == f"error: this command has moved: python -m {new}\n"
-    assert importlib.util.find_spec(new) is not None
+    assert result.stderr == f"error: this command has moved: spoofgym {new}\n"
+    assert find(new.split()) is not None or new in groups()
+
+
+def test_every_program_of_the_package_says_its_new_name():
+    """Their own modules hold the names, so that no old spelling runs or ends without a word."""
+    for command in COMMANDS:
+        path = ROOT / f"{command.module.replace('.', '/')}.py"
+        if re.match(r"spoofgym\.(studies|learning)\.(?!evaluate)", command.module):
+            assert re.search(r'sys\.exit\(moved\("spoofgym (.+)"\)\)', path.read_text())[1] in command.parser().prog
+
+
+@pytest.mark.parametrize(
+    ("arguments", "new"),
+    [
+        (["--matrix", "--arl0", "300"], "matrix"),
+        (["--defender=runs/d"], "evaluate defenders"),
+        (["--scenario", "recorded:x", "--attack", "ramp:1"], "evaluate recorded FOLDER"),
+        (["--attacker", "runs/x"], "evaluate spoofers"),
+    ],
+)
+def test_the_program_that_did_four_things_names_the_one_that_is_meant(arguments, new):
+    assert new_name(arguments) == f"spoofgym {new}"

@@ -1,1 +1,1 @@
-"""Published figures beside our own, a row for each: ``python -m spoofgym.studies.reproduce PAPER``."""
+"""Published figures beside our own, a row for each: ``spoofgym reproduce PAPER``."""

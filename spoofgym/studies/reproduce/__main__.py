@@ -1,10 +1,10 @@
 """Print published figures beside ours.
 
-    python -m spoofgym.studies.reproduce liu-2018
-    python -m spoofgym.studies.reproduce foi-r-5687 --json rows.json
-    python -m spoofgym.studies.reproduce shadmehri-2025
-    python -m spoofgym.studies.reproduce song-2021
-    python -m spoofgym.studies.reproduce kujur-2024
+    spoofgym reproduce liu-2018
+    spoofgym reproduce foi-r-5687 --json rows.json
+    spoofgym reproduce shadmehri-2025
+    spoofgym reproduce song-2021
+    spoofgym reproduce kujur-2024
 
 The argument names the paper.
 """
@@ -17,9 +17,14 @@ from collections.abc import Sequence
 
 from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, count
 from spoofgym.console import console
-from spoofgym.program import do_all, give_json, program
+from spoofgym.program import do_all, give_json, moved, program
 from spoofgym.studies.reproduce import foi_r_5687, kujur_2024, liu_2018, shadmehri_2025, song_2021
 from spoofgym.studies.reproduce.table import WIDTH, print_reproduction
+
+EXAMPLES = (
+    "spoofgym reproduce liu-2018",
+    "spoofgym reproduce foi-r-5687 --quick --json rows.json",
+)
 
 PAPERS = {module.PAPER: module.reproduce for module in (liu_2018, foi_r_5687, shadmehri_2025, song_2021, kujur_2024)}
 RUNS, QUICK_RUNS = 40, 4
@@ -28,7 +33,7 @@ RUNS, QUICK_RUNS = 40, 4
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
-        prog="python -m spoofgym.studies.reproduce", description="Published figures beside ours, with a verdict."
+        prog="spoofgym reproduce", examples=EXAMPLES, description="Published figures beside ours, with a verdict."
     )
     add = result.add_argument
     add("paper", choices=sorted(PAPERS), help="whose figures")
@@ -55,4 +60,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym reproduce"))

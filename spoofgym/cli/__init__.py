@@ -1,0 +1,1 @@
+"""The command ``spoofgym``: one face of all programs. ``spoofgym --help`` lists them."""

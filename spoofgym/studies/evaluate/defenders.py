@@ -1,0 +1,92 @@
+"""Evaluate defenders on populations of attacks, beside every classical defender and two yardsticks.
+
+    spoofgym evaluate defenders --scenario foi-drive --defender runs/d --json out.json --figure out.png
+
+All defenders play the same games, half of which are clean.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from rich.console import Console
+
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, add_threads, count
+from spoofgym.console import console
+from spoofgym.evaluation.defenders import POPULATIONS, check_names, evaluate_defenders, left_out
+from spoofgym.navigation.family import FIDELITIES
+from spoofgym.policies.classical import parse, watcher_and_response
+from spoofgym.policies.learned import LearnedDefender
+from spoofgym.policies.published import policy_folder
+from spoofgym.program import program
+from spoofgym.scenarios import make_scenario
+from spoofgym.studies.defenders_presentation import defenders_figure, defenders_tables
+from spoofgym.studies.evaluate.giving import give
+from spoofgym.studies.notes import tell_what_is_new
+
+EXAMPLES = (
+    "spoofgym evaluate defenders --scenario foi-drive --defender runs/d",
+    "spoofgym evaluate defenders --defender snapshot/exclude --episodes 500",
+)
+EPISODES = 4_000
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym evaluate defenders",
+        description="Evaluate defenders on populations of attacks, beside every classical defender.",
+        examples=EXAMPLES,
+    )
+    add = result.add_argument
+    add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
+    add("--defender", action="append", default=[], metavar="POLICY|SPEC",
+        help="run folder or name of a trained defender, or detector/response; repeatable")
+    add("--population", action="append", choices=tuple(POPULATIONS), help="of attacks; repeatable (default: all)")
+    add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
+    add("--episodes", type=count, default=EPISODES, help="games of each defender (default: %(default)s)")
+    add_seed(result, "game 0")
+    add_threads(result)
+    add_json(result)
+    add_figure(result)
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    terminal = console(stderr=options.json == STDOUT)
+    report = _report(options, terminal)
+    figures = [("figure", options.figure, partial(defenders_figure, report))]
+    give(report, defenders_tables(report), options.json, terminal, figures)
+    return 0
+
+
+def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
+    scenario = make_scenario(options.scenario)
+    fidelity = options.fidelity or scenario.fidelities[0]
+    scenario.check_fidelity(fidelity)
+    policies, given = [], []
+    for text in options.defender:
+        if watcher_and_response(text) is not None:
+            given.append(parse(text))
+            continue
+        try:
+            folder = policy_folder(text)
+        except ValueError as error:
+            message = f"--defender {text!r} is neither a run folder nor detector/response: {error}"
+            raise ValueError(message) from error
+        policies.append(LearnedDefender.load(folder))
+    populations = options.population or tuple(POPULATIONS)
+    check_names(policies)
+    tell_what_is_new(policies, scenario, fidelity)
+    for line in left_out(scenario):
+        terminal.print(line, markup=False, soft_wrap=True)
+    return evaluate_defenders(
+        scenario, fidelity, policies, given, populations, options.episodes, options.seed, options.threads,
+        terminal.status,
+    )

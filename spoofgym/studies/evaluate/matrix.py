@@ -1,0 +1,115 @@
+"""Play every attack against every detector, all of them at an equal false-alarm rate.
+
+spoofgym matrix --scenario liu-flight --arl0 10000 --json out.json --figure out.png --roc roc.png
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from rich.console import Console
+
+from spoofgym.command_line import (
+    STDOUT,
+    Parser,
+    above_one,
+    add_figure,
+    add_json,
+    add_seed,
+    add_threads,
+    count,
+    picture,
+)
+from spoofgym.console import console
+from spoofgym.evaluation.matrix_games import ATTACKS, Matrix
+from spoofgym.navigation.family import FIDELITIES
+from spoofgym.program import program
+from spoofgym.scenarios import make_scenario
+from spoofgym.studies.evaluate.giving import give, spoofers
+from spoofgym.studies.matrix_presentation import curves_figure, matrix_figure, matrix_tables
+from spoofgym.studies.notes import tell_what_is_new
+
+EXAMPLES = (
+    "spoofgym matrix --scenario liu-flight --figure matrix.png",
+    "spoofgym matrix --detector snapshot --detector cusum --attack ramp:0.2 \\",
+    "  --attack jump:20 --episodes 500 --roc roc.png",
+)
+EPISODES = {"linear": 4_000, "strapdown": 500}
+ARL0 = 1e4
+ROC_ATTACK = "ramp:0.1"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym matrix",
+        description="Play every attack against every detector, all detectors at an equal false-alarm rate.",
+        examples=EXAMPLES,
+    )
+    add = result.add_argument
+    add("--scenario", default="liu-flight", help="what is driven or flown (default: %(default)s)")
+    add("--detector", action="append", help="of the matrix; repeatable (default: every family)")
+    add("--attack", action="append", default=[], metavar="SPEC",
+        help=f"of the matrix; repeatable (default: {len(ATTACKS)} scripted ones and the optimal ones that fit)")
+    add("--attacker", action="append", default=[], metavar="POLICY",
+        help="run folder or name of a trained spoofer; repeatable")
+    add("--shadow", metavar="SPEC",
+        help="scenario whose filter every attacker takes for the victim's, in place of the one it was trained with")
+    add("--arl0", type=above_one, default=ARL0, help="epochs between false alarms (default: %(default)g)")
+    add("--roc", type=picture, metavar="FILE", help="draw ROC and DET curves of one attack")
+    add("--roc-attack", metavar="SPEC",
+        help=f"which attack of the matrix that is (default: {ROC_ATTACK}, or the first where it is not in the matrix)")
+    add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
+    add("--episodes", type=count, help="games of each attack (default: 4000 linear, 500 strapdown)")
+    add_seed(result, "game 0")
+    add_threads(result)
+    add_json(result)
+    add_figure(result)
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    terminal = console(stderr=options.json == STDOUT)
+    report = _report(options, terminal)
+    figures = [
+        ("figure", options.figure, partial(matrix_figure, report)),
+        ("curves", options.roc, partial(_curves, report, options.roc_attack)),
+    ]
+    give(report, matrix_tables(report), options.json, terminal, figures)
+    return 0
+
+
+def _curves(report: dict[str, Any], asked: str | None, path: Any) -> None:
+    attacks = list(dict.fromkeys(curve["attack"] for curve in report["curves"]))
+    curves_figure(report, _roc_attack(asked, attacks), path)
+
+
+def _roc_attack(asked: str | None, attacks: list[str]) -> str:
+    """The attack whose curves are drawn: the one asked for, else the usual one or the first of the matrix."""
+    if asked is None:
+        return ROC_ATTACK if ROC_ATTACK in attacks else attacks[0]
+    if asked not in attacks:
+        raise ValueError(f"--roc-attack {asked!r} is not in the matrix; there are: {', '.join(attacks)}")
+    return asked
+
+
+def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
+    scenario = make_scenario(options.scenario)
+    if not scenario.random:
+        raise ValueError(f"{scenario.name} is a recorded log: the matrix needs a simulated scenario")
+    fidelity = options.fidelity or scenario.fidelities[0]
+    scenario.check_fidelity(fidelity)
+    policies = spoofers(options.attacker, options.shadow)
+    episodes = options.episodes or EPISODES[fidelity]
+    matrix = Matrix(scenario, fidelity, options.arl0, episodes, options.seed, options.threads)
+    if options.roc is not None:
+        _roc_attack(options.roc_attack, matrix.names(options.attack, policies))
+    matrix.check_knowledge(policies)
+    tell_what_is_new(policies, scenario, fidelity)
+    return matrix.report(options.detector or (), options.attack, policies, terminal.status)

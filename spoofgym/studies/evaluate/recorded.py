@@ -1,0 +1,62 @@
+"""Evaluate detectors and attacks on a recorded log: the clean filter, and what each attack does to it.
+
+spoofgym evaluate recorded FOLDER --attack ramp:0.5 --detector snapshot --json -
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+from spoofgym.calibration import calibrated_for_play
+from spoofgym.command_line import STDOUT, Parser, add_json
+from spoofgym.console import console
+from spoofgym.detectors import make_detector
+from spoofgym.envs.opponents import make_spoofer
+from spoofgym.evaluation.recorded import evaluate_recorded
+from spoofgym.evaluation.report import recorded_report
+from spoofgym.program import program
+from spoofgym.scenarios import make_scenario
+from spoofgym.studies.evaluate.giving import give
+from spoofgym.studies.presentation import recorded_table
+
+EXAMPLES = (
+    "spoofgym evaluate recorded FOLDER --attack ramp:0.5 --detector snapshot",
+    "spoofgym evaluate recorded FOLDER,noise_factor=3 --attack jump:20 --json -",
+)
+RECORDED = "recorded"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    result = Parser(
+        prog="spoofgym evaluate recorded",
+        description="Evaluate detectors and attacks on a recorded log, with the strapdown filter.",
+        examples=EXAMPLES,
+    )
+    add = result.add_argument
+    add("log", metavar="FOLDER", help="of the log, and options after it: FOLDER,noise_factor=3")
+    add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
+    add("--attack", action="append", metavar="SPEC",
+        help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: ramp:0.5)")
+    add_json(result)
+    return result
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit status."""
+    options = parser().parse_args(arguments)
+    report = _report(options)
+    give(report, recorded_table(report), options.json, console(stderr=options.json == STDOUT), [])
+    return 0
+
+
+def _report(options: argparse.Namespace) -> dict[str, Any]:
+    log = options.log if options.log.startswith(f"{RECORDED}:") else f"{RECORDED}:{options.log}"
+    scenario = make_scenario(log)
+    detectors = [make_detector(name) for name in options.detector or ["snapshot"]]
+    ready = calibrated_for_play(detectors, scenario, scenario.fidelities[0])
+    attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]
+    return recorded_report(scenario, ready, evaluate_recorded(scenario, attacks, ready))
