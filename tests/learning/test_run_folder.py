@@ -97,7 +97,7 @@ def test_ctrl_c_leaves_a_policy_and_a_run_that_ends_all_the_same(name, uninterru
         assert resume(program, path) == 130
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("interrupted after")
-    assert line.endswith(f"go on with: python -m spoofgym.learning.{name} --resume --out {path}")
+    assert line.endswith(f"go on with: spoofgym train {name} --resume --out {path}")
     {"spoofer": LearnedSpoofer, "defender": LearnedDefender}[name].load(path)
     assert resume(program, path) == 0
     assert result(path) == expected
@@ -216,7 +216,7 @@ def test_a_process_that_is_killed_goes_on(uninterrupted, tmp_path, child):
     _, expected, _ = uninterrupted("defender")
     path = tmp_path / "run"
     program = begun(path, "defender")
-    process = child([sys.executable, "-m", "spoofgym.learning.defender", "--resume", "--out", str(path)])
+    process = child([sys.executable, "-m", "spoofgym", "train", "defender", "--resume", "--out", str(path)])
     deadline = time.monotonic() + 300
     while not (path / CHECKPOINT_FILE).exists() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.005)

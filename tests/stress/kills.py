@@ -72,7 +72,7 @@ def _begin(program: str, path: Path) -> None:
 
 
 def _command(program: str, path: Path) -> list[str]:
-    return [sys.executable, "-m", program, "--resume", "--out", str(path)]
+    return [sys.executable, "-m", "spoofgym", "train", program.rpartition(".")[2], "--resume", "--out", str(path)]
 
 
 def _leg(program: str, path: Path, moment: float) -> int | None:
