@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
 
 from spoofgym import validation
-from spoofgym.geodesy import normal_gravity
+from spoofgym.geodesy import normal_gravity, position_difference
 from spoofgym.kernels import njit
 from spoofgym.mechanization import advance_position, attitude_matrix, invert_mechanization
 from spoofgym.validation import written
@@ -24,6 +25,10 @@ MOST_STEPS = 20_000_000
 """IMU intervals of a trajectory: it stays in memory, 200 bytes each."""
 MAX_LATITUDE = math.radians(89.0)
 """ENU turns without bound at a pole: trajectories stay below this latitude, rad."""
+FEWEST_POINTS = 6
+"""A spline of the fifth order, whose jerk is continuous, needs so many."""
+SLOWEST = 0.005
+"""Speed over ground below which a velocity gives no heading, m/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,15 +237,89 @@ def fly(
         [ground_speed * np.sin(heading_along), ground_speed * np.cos(heading_along), climb_rate], axis=-1
     )
     bank = coordinated_bank(ground_speed, turn_rate, normal_gravity(start[0], start[2]))
-    attitude = attitude_matrix(climb_angle, bank, heading_along)
-    positions = np.empty((num_steps + 1, 3))
+    return _trajectory(start, velocity, attitude_matrix(climb_angle, bank, heading_along), rate)
+
+
+def fly_through(times: ArrayLike, positions: ArrayLike, *, rate: float = 100.0) -> Trajectory:
+    """Flies (or drives) through given positions at given times, without sideslip and with coordinated turns.
+
+    A spline of the fifth order passes through all points: noise of measured positions becomes acceleration, so smooth
+    them first. Points a second apart are dense enough for a vehicle that turns within some seconds. The trajectory
+    begins at time 0 with the first point.
+
+    Args:
+        times: (n,) of the points, increasing, s.
+        positions: (n, 3) latitude rad, longitude rad, height m. `spoofgym.geodesy.displace` makes them from metres
+            east, north and up of a place.
+        rate: IMU samples per second.
+
+    Returns:
+        The trajectory; mechanizing its measurements from its first state reproduces it to rounding.
+
+    Raises:
+        ValueError: fewer than six points, times that do not increase, positions that are none, or a vehicle that
+            moves too slowly for its velocity to give a heading.
+    """
+    rate = validation.above("fly_through", "rate", rate)
+    moments, places = _points(times, positions)
+    num_steps = math.floor(moments[-1] * rate * (1.0 + 1e-12))
+    if not 1 <= num_steps <= MOST_STEPS:
+        raise ValueError(f"fly_through: times must span 1 to {MOST_STEPS} IMU intervals, got {num_steps}")
+    time = np.arange(num_steps + 1) / rate
+    path = make_interp_spline(moments, places, k=5)
+    # where it would be a second later, at the rates of the angles: metres per second
+    velocity = position_difference(path(time) + path(time, 1), path(time))
+    ground_speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    if np.any(ground_speed < SLOWEST):
+        i = int(np.argmin(ground_speed))
+        raise ValueError(
+            f"fly_through: at {written(time[i])} s the speed over ground is {ground_speed[i]:.3g} m/s, which gives no "
+            f"heading: it must be {SLOWEST} m/s or more"
+        )
+    heading = np.unwrap(np.arctan2(velocity[:, 0], velocity[:, 1]))
+    turn_rate = np.gradient(heading, 1.0 / rate) if num_steps > 1 else np.zeros_like(heading)
+    bank = coordinated_bank(ground_speed, turn_rate, normal_gravity(places[0, 0], places[0, 2]))
+    attitude = attitude_matrix(np.arctan2(velocity[:, 2], ground_speed), bank, heading)
+    return _trajectory(places[0], velocity, attitude, rate)
+
+
+def _points(times: ArrayLike, positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times from the first one on (n,), s, and positions (n, 3), checked."""
+    moments, places = validation.real_array(times), validation.real_array(positions)
+    if moments is None or moments.ndim != 1 or len(moments) < FEWEST_POINTS or not np.all(np.isfinite(moments)):
+        raise ValueError(
+            f"times must be {FEWEST_POINTS} or more finite numbers, one per point, got {validation.shown(times)}"
+        )
+    if np.any(np.diff(moments) <= 0.0):
+        raise ValueError("times must increase from each point to the next")
+    if places is None or places.shape != (len(moments), 3):
+        raise ValueError(
+            f"positions must have shape ({len(moments)}, 3), as many as times: latitude rad, longitude rad, height m; "
+            f"got {validation.shown(positions)}"
+        )
+    for place in places:
+        _start(place)
+    places = np.array(places, dtype=np.float64)
+    places[:, 1] = np.unwrap(places[:, 1])
+    return np.asarray(moments - moments[0], dtype=np.float64), places
+
+
+def _trajectory(
+    start: NDArray[np.float64], velocity: NDArray[np.float64], attitude: NDArray[np.float64], rate: float
+) -> Trajectory:
+    """The trajectory of a velocity (n + 1, 3), ENU, m/s, and an attitude (n + 1, 3, 3), from ``start`` (3,).
+
+    Raises:
+        ValueError: it comes too near to a pole.
+    """
+    positions = np.empty_like(velocity)
     _integrate_position(start, velocity, 1.0 / rate, positions)
     if not np.all(np.abs(positions[:, 0]) <= MAX_LATITUDE):
         raise ValueError(f"the trajectory leaves latitudes within +-{math.degrees(MAX_LATITUDE):.0f} degrees")
     angular_rate, specific_force = invert_mechanization(attitude, velocity, positions, 1.0 / rate)
     return Trajectory(
         rate=float(rate),
-        time=time,
+        time=np.arange(len(velocity)) / rate,
         attitude=attitude,
         velocity=velocity,
         position=positions,

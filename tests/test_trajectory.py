@@ -6,9 +6,19 @@ import time
 import numpy as np
 import pytest
 
-from spoofgym.geodesy import EARTH_RATE, position_difference
+from spoofgym.geodesy import EARTH_RATE, displace, position_difference
 from spoofgym.scenarios.liu_flight import LIU_END, liu_trajectory
-from spoofgym.trajectory import Accelerate, Climb, Straight, Turn, coordinated_bank, fly, smooth_step, smooth_step_rate
+from spoofgym.trajectory import (
+    Accelerate,
+    Climb,
+    Straight,
+    Turn,
+    coordinated_bank,
+    fly,
+    fly_through,
+    smooth_step,
+    smooth_step_rate,
+)
 from tests.attitudes import euler_angles
 
 START = (0.6, 1.9, 500.0)
@@ -184,3 +194,58 @@ def test_bad_input_is_told_what_is_valid(make, message):
 def test_arrays_that_do_not_fit_are_refused(flight):
     with pytest.raises(ValueError, match=r"velocity must have shape \(12001, 3\), got \(12000, 3\)"):
         dataclasses.replace(flight, velocity=flight.velocity[1:])
+
+
+CIRCLE = np.linspace(0.0, 60.0, 61)
+"""Times of points on a circle of radius 200 m, once round in 60 s, climbing 1 m/s, s."""
+
+
+def circle(times):
+    angle = 2.0 * np.pi * times / 60.0
+    east, north = 200.0 * np.sin(angle), 200.0 * (1.0 - np.cos(angle))
+    return displace(START, np.stack([east, north, times], axis=-1))
+
+
+def test_it_flies_through_points_with_the_velocity_and_the_bank_of_the_circle():
+    """Points of a known circle: v = 2πR/T, and a coordinated bank with tan φ = v²/(R g); the ends of a spline bend."""
+    flown = fly_through(CIRCLE, circle(CIRCLE), rate=50.0)
+    missed = position_difference(flown.position[::50], circle(CIRCLE))
+    np.testing.assert_allclose(missed, 0.0, atol=2e-3)
+    speed = np.hypot(flown.velocity[:, 0], flown.velocity[:, 1])
+    np.testing.assert_allclose(speed[250:-250], 2.0 * np.pi * 200.0 / 60.0, rtol=1e-4)
+    np.testing.assert_allclose(flown.velocity[:, 2], 1.0, atol=1e-6)
+    pitch, roll, _ = euler_angles(flown.attitude[1500])
+    assert roll == pytest.approx(-np.arctan((2.0 * np.pi / 60.0) ** 2 * 200.0 / 9.795), rel=2e-3)
+    assert pitch == pytest.approx(np.arctan2(1.0, 2.0 * np.pi * 200.0 / 60.0), rel=1e-3)
+
+
+def test_points_on_a_straight_line_give_the_straight_flight():
+    """Along a meridian, where straight and level means due north."""
+    flown = fly((Straight(30.0),), position=START, speed=40.0, heading=0.0, rate=50.0)
+    through = fly_through(flown.time[::50], flown.position[::50], rate=50.0)
+    np.testing.assert_allclose(through.velocity, flown.velocity, atol=1e-4)
+    np.testing.assert_allclose(through.attitude, flown.attitude, atol=1e-4)
+    np.testing.assert_allclose(through.specific_force[100:-100], flown.specific_force[100:-100], atol=1e-3)
+
+
+def test_it_crosses_the_date_line():
+    path = displace((0.2, np.pi, 0.0), np.stack([np.linspace(-500.0, 500.0, 51), np.zeros(51), np.zeros(51)], axis=-1))
+    path[:, 1] = (path[:, 1] + np.pi) % (2.0 * np.pi) - np.pi
+    flown = fly_through(np.arange(51.0), path)
+    np.testing.assert_allclose(flown.velocity[:, 0], 20.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("times", "positions", "words"),
+    [
+        (np.arange(5.0), circle(np.arange(5.0)), "times must be 6 or more"),
+        (np.zeros(6), circle(np.arange(6.0)), "times must increase"),
+        (np.arange(6.0), circle(np.arange(7.0)), r"shape \(6, 3\)"),
+        (np.arange(6.0), np.degrees(circle(np.arange(6.0))), "are these degrees"),
+        (np.arange(6.0), np.tile(START, (6, 1)), "gives no heading"),
+        (np.arange(6.0) * 1e-4, circle(np.arange(6.0)), "must span 1 to"),
+    ],
+)
+def test_points_that_are_no_path_are_refused(times, positions, words):
+    with pytest.raises(ValueError, match=words):
+        fly_through(times, positions)

@@ -12,6 +12,8 @@ import dataclasses
 import hashlib
 import json
 import math
+import weakref
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +28,8 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.files import write_json
 from spoofgym.scenario import Scenario
-from spoofgym.scenarios import make_scenario
+from spoofgym.scenarios import SCENARIOS, make_scenario
+from spoofgym.specification import Specification
 
 LATER_ROOMS = ("optimum", "policies", "envs", "evaluation", "studies", "report", "learning", "cli")
 """Rooms of the package that use calibration, and that calibration never imports: they decide no threshold."""
@@ -128,8 +131,14 @@ def spelled_out(detector: Detector) -> bool:
 
 
 def spelled_out_scenario(scenario: Scenario) -> bool:
-    """Whether the name of a scenario builds another one like it."""
+    """Whether the name of a scenario builds another one like it, from the source that decides a result.
+
+    A scenario that a user has registered is told by the object: what its name builds can change at any time.
+    """
     if not dataclasses.is_dataclass(scenario):
+        return False
+    factory = SCENARIOS.get(Specification.parse(scenario.name).name)
+    if factory is None or not factory.__module__.startswith("spoofgym.scenarios."):
         return False
     try:
         other = make_scenario(scenario.name)
@@ -139,8 +148,55 @@ def spelled_out_scenario(scenario: Scenario) -> bool:
 
 
 def identity(scenario: Scenario) -> object:
-    """What tells a scenario from others: its name, or the object itself where the name does not build it."""
-    return scenario.name if spelled_out_scenario(scenario) else scenario
+    """What tells a scenario from others.
+
+    Returns:
+        Its name where the name builds it; else the digest of all that it consists of, so that a scenario of one's own is
+        known again in another process; else the object itself, where it holds what no digest covers.
+    """
+    if spelled_out_scenario(scenario):
+        return scenario.name
+    if scenario not in _DIGESTS:
+        _DIGESTS[scenario] = _content_digest(scenario)
+    return _DIGESTS[scenario] or scenario
+
+
+_DIGESTS: weakref.WeakKeyDictionary[Scenario, str | None] = weakref.WeakKeyDictionary()
+
+
+def _content_digest(scenario: Scenario) -> str | None:
+    """Digest of the fields of a scenario and of all that they hold; None where a part is of a class of the user's."""
+    digest = hashlib.sha256()
+    try:
+        for piece in _content(scenario):
+            digest.update(len(piece).to_bytes(8, "little") + piece)
+    except TypeError:
+        return None
+    return f"content {digest.hexdigest()}"
+
+
+def _content(value: Any) -> Iterator[bytes]:
+    """The bytes of a value and of all that it holds.
+
+    Raises:
+        TypeError: a value that is neither a number, text, an array, a sequence of these nor a data class of the package.
+    """
+    if dataclasses.is_dataclass(value) and type(value).__module__.startswith("spoofgym."):
+        yield f"{type(value).__module__}.{type(value).__qualname__}".encode()
+        for field in dataclasses.fields(value):
+            yield field.name.encode()
+            yield from _content(getattr(value, field.name))
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
+        yield f"{value.dtype.str} {value.shape}".encode()
+        yield np.ascontiguousarray(value).tobytes()
+    elif isinstance(value, tuple | list):
+        yield f"{type(value).__name__} {len(value)}".encode()
+        for item in value:
+            yield from _content(item)
+    elif value is None or isinstance(value, bool | int | float | str):
+        yield f"{type(value).__name__} {value!r}".encode()
+    else:
+        raise TypeError(f"no digest of a {type(value).__name__}")
 
 
 def _alike(one: Any, other: Any) -> bool:

@@ -306,13 +306,14 @@ def _needs_calibration(detector: Detector, scenario: Scenario) -> bool:
 
 
 def _disk_key(detector: Detector, scenario: Scenario, fidelity: str) -> str | None:
-    """The name of a result on disk; None where the names of detector and scenario do not say all about them."""
-    if not (calibration_cache.spelled_out(detector) and calibration_cache.spelled_out_scenario(scenario)):
+    """The name of a result on disk; None where no text says all about detector and scenario."""
+    where = calibration_cache.identity(scenario)
+    if not (calibration_cache.spelled_out(detector) and isinstance(where, str)):
         return None
     if any(member.calibrated and member.origin is None for member in detector.members):
         return None
     numbers = (RUNS, FIRST_ALARMS, SIMULATED_FIRST_ALARMS, SLOPE_RUNS)
-    return calibration_cache.key(scenario.name, detector.name, fidelity, *map(str, numbers))
+    return calibration_cache.key(where, detector.name, fidelity, *map(str, numbers))
 
 
 def _recall(detector: Detector, scenario: Scenario, fidelity: str) -> Setting | None:

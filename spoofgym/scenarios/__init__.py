@@ -34,7 +34,12 @@ _CACHE = ScenarioCache()
 
 
 def _build(text: str) -> Scenario:
-    return _CACHE.get((text, _log_state(text)), partial(build, text, SCENARIOS, "scenario"))
+    return _CACHE.get((text, _factory(text), _log_state(text)), partial(build, text, SCENARIOS, "scenario"))
+
+
+def _factory(text: str) -> Callable[..., Scenario] | None:
+    """The function that builds it, which may be registered anew under its name; None where there is none."""
+    return SCENARIOS.get(Specification.parse(text).name)
 
 
 def _log_state(text: str) -> State | None:

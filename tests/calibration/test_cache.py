@@ -260,7 +260,7 @@ def test_the_digest_leaves_out_what_uses_calibration_only(monkeypatch, package_c
     assert len(digests) == 4
 
 
-def test_objects_that_their_name_does_not_build_stay_in_memory(place):
+def test_a_detector_that_its_name_does_not_build_stays_in_memory(place):
     class Own(Windowed):
         """A user's class that keeps the name of its base."""
 
@@ -272,8 +272,25 @@ def test_objects_that_their_name_does_not_build_stay_in_memory(place):
     assert not calibration_cache.spelled_out_scenario(other)
     assert not calibration_cache.spelled_out_scenario(scenario.changed(name="unheard-of"))
     assert calibrated(Own(3, arl0=50.0), scenario).calibrated
-    assert calibrated(make_detector("windowed:n=4,arl0=50"), other).calibrated
     assert not place.exists()
+
+
+def test_a_scenario_that_its_name_does_not_build_is_told_by_all_that_it_consists_of(place):
+    """The same parts, built a second time, find the result on disk; another value, or a class of a user's, does not."""
+
+    class Own(type(make_scenario(SCENARIO).family)):
+        """A user's kind of filter."""
+
+    def built(**changes):
+        return make_scenario(SCENARIO).changed(horizon=25, **changes)
+
+    one, same, other = built(), built(), built(error_scale=11.0)
+    assert calibration_cache.identity(one) == calibration_cache.identity(same) != calibration_cache.identity(other)
+    assert calibrated(make_detector("windowed:n=4,arl0=50"), one).calibrated
+    assert len(list(place.iterdir())) == 1
+    fields = {item.name: getattr(one.family, item.name) for item in dataclasses.fields(one.family)}
+    strange = one.changed(family=Own(**fields))
+    assert calibration_cache.identity(strange) is strange
 
 
 def test_together_is_the_same_as_alone(monkeypatch, tmp_path):
