@@ -151,8 +151,8 @@ def identity(scenario: Scenario) -> object:
     """What tells a scenario from others.
 
     Returns:
-        Its name where the name builds it; else the digest of all that it consists of, so that a scenario of one's own is
-        known again in another process; else the object itself, where it holds what no digest covers.
+        Its name where the name builds it; else the digest of all that it consists of, so that a scenario of one's own
+        is known again in another process; else the object itself, where it holds what no digest covers.
     """
     if spelled_out_scenario(scenario):
         return scenario.name
@@ -179,7 +179,8 @@ def _content(value: Any) -> Iterator[bytes]:
     """The bytes of a value and of all that it holds.
 
     Raises:
-        TypeError: a value that is neither a number, text, an array, a sequence of these nor a data class of the package.
+        TypeError: a value that is neither a number, text, an array, a sequence of these nor a data class of the
+            package.
     """
     if dataclasses.is_dataclass(value) and type(value).__module__.startswith("spoofgym."):
         yield f"{type(value).__module__}.{type(value).__qualname__}".encode()
