@@ -8,7 +8,7 @@ BIN := .venv/bin/python
 UV  := $(shell command -v uv 2>/dev/null)
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev demo test test-portable lint typecheck benchmark clean distclean
+.PHONY: help install install-dev demo docs test test-portable lint typecheck benchmark clean distclean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -30,6 +30,13 @@ lint: install-dev ## check style and docstrings
 typecheck: install-dev ## check types
 	$(BIN) -m mypy
 
+docs: install-dev ## build the documentation into docs/_build/html; a warning is an error
+	@if $(BIN) -c 'import sys; sys.exit(sys.version_info >= (3, 11))'; then \
+	    echo "not built: the documentation needs Python 3.11 or newer"; \
+	else \
+	    $(BIN) -m sphinx -W --keep-going -q -b html docs docs/_build/html && echo "docs/_build/html/index.html"; \
+	fi
+
 benchmark: install ## measure environment steps per second
 	$(BIN) -m benchmarks.throughput
 
@@ -37,7 +44,7 @@ install: .venv/.installed-train ## make .venv with what the programs need
 install-dev: .venv/.installed-dev ## the same, and the tools of a developer
 
 clean: ## remove caches, compiled kernels and built packages (keeps .venv and runs/)
-	rm -rf build dist .pytest_cache .hypothesis .ruff_cache .mypy_cache
+	rm -rf build dist docs/_build .pytest_cache .hypothesis .ruff_cache .mypy_cache
 	find . -name .venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
 
 distclean: clean ## remove .venv, too

@@ -17,7 +17,7 @@ ROOMS = (
     *("calibration", "optimum", "policies", "envs", "duel", "evaluation", "studies", "report", "learning"),
     *("cli", "__main__"),
 )
-"""In the order of docs/architecture.md. What is not named is the ground floor, which knows no room."""
+"""In the order of docs/inside/architecture.md. What is not named is the ground floor, which knows no room."""
 FILTERS = ("loose", "tight", "credible", "separation")
 """In order, too: a filter may use those before it."""
 LEARNERS = ("torch", "stable_baselines3", "tensorboard")

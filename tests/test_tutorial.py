@@ -9,7 +9,7 @@ import pytest
 
 from spoofgym.detectors.base import Detector
 
-PAGE = (Path(__file__).parents[1] / "docs" / "tutorial-detector.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "detector.md").read_text(encoding="utf-8")
 BLOCK = r"```python\n(.*?)```\n((?:\n?    [^\n]*\n)*)"
 """A block of code, and what it prints: the indented lines that follow."""
 BLOCKS, SHOWN = zip(*re.findall(BLOCK, PAGE, flags=re.DOTALL), strict=True)

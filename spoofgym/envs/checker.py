@@ -1,7 +1,7 @@
 """A checker of vector environments, for spoofgym's own and for anyone's.
 
 Gymnasium and Stable-Baselines3 check single environments only. `check_vector_env` holds a native vector environment to
-what Gymnasium documents and `gymnasium.vector.SyncVectorEnv` does:
+what Gymnasium documents and `gymnasium.vector.SyncVectorEnv` does::
 
     from spoofgym.envs.checker import check_vector_env
 

@@ -93,7 +93,7 @@ def separable_optimum(gain: Floats, dimension: int, threshold: float) -> tuple[F
     The inverse of -h' comes from a table; E by bisection, since Σ g x(g/E) falls and E rises. Since x h'(x) >= -1 at a
     solution and -h'(x) >= x - √threshold, no epoch spends more than √threshold + 1. The bound allows for the error of
     the table: by concavity g x / E + h(x) exceeds its value at the tabulated x by at most |g/E + h'| times the length
-        of the interval where the maximum lies.
+    of the interval where the maximum lies.
 
     Args:
         gain: g_k of each direction, (A, K), m.

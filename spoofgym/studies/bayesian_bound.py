@@ -3,7 +3,7 @@
     spoofgym bound bayes --scenario foi-drive --population training --games 500 --json bound.json
 
 Defenders of the table are the tuned ones of the scenario and two yardsticks, or those that ``--defender`` names. A run
-that was stopped goes on with the same command. ``docs/bounds.md`` says what the bound is.
+that was stopped goes on with the same command. ``docs/results/bounds.md`` says what the bound is.
 """
 
 from __future__ import annotations

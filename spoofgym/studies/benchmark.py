@@ -4,12 +4,12 @@
     spoofgym benchmark defend snapshot/exclude --json result.json
     spoofgym benchmark attack policy:runs/s0 policy:runs/s1 policy:runs/s2   # seeds of one method
     spoofgym benchmark defend policy:runs/d --tasks foi-drive
-    spoofgym benchmark table --write docs/benchmark.md
+    spoofgym benchmark table --write docs/results/benchmark.md
     spoofgym benchmark references attack
 
 A player is spelled as everywhere: an attack or a response, ``detector > response``, ``policy:NAME`` or
 ``policy:FOLDER``. Games are kept in a folder, so that a program that was stopped goes on with the same command. The
-definition stands in `spoofgym.evaluation.benchmark_v1`, and docs/benchmark.md is the page.
+definition stands in `spoofgym.evaluation.benchmark_v1`, and docs/results/benchmark.md is the page.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     spoofgym bound duel --scenario foi-drive --payoff error --payoff beyond:50
 
-Prints what no defender can keep each payoff below. ``docs/bounds.md`` says what the bound is.
+Prints what no defender can keep each payoff below. ``docs/results/bounds.md`` says what the bound is.
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ def test_largest_offsets_are_those_of_another_programme(drive, number):
 
 
 def test_the_page_states_these_offsets(drive):
-    page = (Path(__file__).parents[2] / "docs" / "attacks.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "attacks.md").read_text(encoding="utf-8")
     (row,) = (line for line in page.splitlines() if line.startswith("| here |"))
     stated = [float(cell) for cell in row.strip("|").split("|")[1:]]
     ours = [np.hypot(*offsets_of(bound(f"foi-{number}", drive))[:, :2].T).max() for number in FOI_SCENARIOS]

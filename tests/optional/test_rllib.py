@@ -1,4 +1,4 @@
-"""RLlib trains both sides of the duel as docs/scale.md shows it. Skipped without `ray[rllib]`, which CI has not."""
+"""RLlib trains both sides of the duel as docs/how-to/cluster.md shows it. Skipped without `ray[rllib]`, which CI has not."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("ray.rllib")
 
-PAGE = (Path(__file__).parents[2] / "docs" / "scale.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "cluster.md").read_text(encoding="utf-8")
 (BLOCK,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
 SMALLER = {
     '"scenario": "foi-drive"': '"scenario": "foi-drive:horizon=60"',

@@ -2,7 +2,7 @@
 
 The games are those behind the reproduction of the report: its drive, its receiver with an over-stated covariance, nine
 states, test (3) with the report's thresholds. Twelve runs each; the limits are far from what is measured with forty
-(docs/reproduction.md), and each run meets its own noise.
+(docs/results/reproduction.md), and each run meets its own noise.
 """
 
 import functools

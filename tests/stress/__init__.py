@@ -1,4 +1,4 @@
-"""A program that tries to break the promises of docs/reliability.md: ``python -m tests.stress``."""
+"""A program that tries to break the promises of docs/inside/reliability.md: ``python -m tests.stress``."""
 
 from spoofgym.program import quiet_start
 

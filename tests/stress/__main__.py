@@ -1,4 +1,4 @@
-"""Tries to break what docs/reliability.md promises: ``python -m tests.stress``.
+"""Tries to break what docs/inside/reliability.md promises: ``python -m tests.stress``.
 
 Not part of the test suite: it takes as long as it is told to. Every try follows from the seed. It prints counts, and
 stops with exit status 1 at the first broken promise.
@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
         prog="python -m tests.stress",
-        description="Try to break the promises of docs/reliability.md. Exit status: 0 where all held, 1 at the first "
+        description="Try to break the promises of docs/inside/reliability.md. Exit status: 0 where all held, 1 at the first "
         "that is broken, 2 for a wrong option, 130 after Ctrl-C.",
     )
     add = result.add_argument

@@ -13,7 +13,7 @@ from spoofgym.studies.benchmark_page import players_of, read_rows
 from spoofgym.studies.benchmark_presentation import MARKS, page_columns, page_rows
 from tests.evaluation.tiny_benchmark import TINY
 
-PAGE = Path(__file__).parents[2] / "docs" / "benchmark.md"
+PAGE = Path(__file__).parents[2] / "docs" / "results" / "benchmark.md"
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_mistakes_take_one_line(
 
 
 def test_the_page_holds_the_rows_that_are_kept_of_all_players() -> None:
-    """`spoofgym benchmark table --write docs/benchmark.md` plays whoever is lacking."""
+    """`spoofgym benchmark table --write docs/results/benchmark.md` plays whoever is lacking."""
     rows, text = read_rows(PAGE.with_suffix(".json"), V1), PAGE.read_text(encoding="utf-8")
     assert V1.digest in text
     for track, players in players_of(V1).items():
