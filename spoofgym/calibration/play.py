@@ -31,7 +31,7 @@ def calibrated_for_play(detectors: Sequence[Detector], scenario: Scenario, fidel
 def calibration_fidelity(scenario: Scenario, fidelity: str) -> str:
     """The fidelity of the clean runs that calibrate a detector for play.
 
-    Thresholds of the linear fidelity keep their ARL₀ in the strapdown fidelity (`docs/reference/detectors.md`), where clean runs
-    take 2 to 14 times as long. So every fidelity of a scenario that has the linear one uses its thresholds.
+    Thresholds of the linear fidelity keep their ARL₀ in the strapdown fidelity (`docs/reference/detectors.md`), where
+    clean runs take 2 to 14 times as long. So every fidelity of a scenario that has the linear one uses its thresholds.
     """
     return "linear" if "linear" in scenario.fidelities else fidelity

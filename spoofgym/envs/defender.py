@@ -28,10 +28,10 @@ class DefenderEnv(SingleEnv):
     Each game draws its opponent from a population of attacks, or has none.
 
     On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
-    fixes (`docs/reference/robot.md`): without GNSS it runs on by these. Only the horizontal error counts, there as everywhere. A
-    spoofed height does not enter the estimate there; it still shows in tests that look at the height, as `snapshot`
-    does. `relative-motion`, one of the default detectors, needs an inertial solution, which the robot has not: name
-    others.
+    fixes (`docs/reference/robot.md`): without GNSS it runs on by these. Only the horizontal error counts, there as
+    everywhere. A spoofed height does not enter the estimate there; it still shows in tests that look at the
+    height, as `snapshot` does. `relative-motion`, one of the default detectors, needs an inertial solution, which
+    the robot has not: name others.
 
     With `coupling="tight"` (`kujur-flight`, which is tight by itself, `liu-flight`, and logs of ranges) the filter
     takes the ranges to the satellites instead of fixes, and the defender may leave out single satellites. With fewer

@@ -26,7 +26,8 @@ class SpooferEnv(SingleEnv):
     (`spoofgym.optimum`), so that a learned policy can be reported as a fraction of it.
 
     On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
-    fixes (`docs/reference/robot.md`). The robot knows its height, and only the horizontal error counts, there as everywhere.
+    fixes (`docs/reference/robot.md`). The robot knows its height, and only the horizontal error counts, there as
+    everywhere.
 
     With `coupling="tight"` (`kujur-flight`, which is tight by itself, `liu-flight`, and logs of ranges) the filter
     takes the ranges to the satellites instead of fixes: code and carrier, or code and range rate. The spoofer then

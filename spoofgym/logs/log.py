@@ -1,7 +1,7 @@
 """Reading a recorded log: inertial samples, GNSS fixes and, where there is one, a reference solution.
 
-A log is a folder in the project's format (docs/reference/log-format.md): north-east-down, degrees, raw sensor axes. It is
-converted here, at the door; everything behind works in east-north-up, right-forward-up and radians.
+A log is a folder in the project's format (docs/reference/log-format.md): north-east-down, degrees, raw sensor axes.
+It is converted here, at the door; everything behind works in east-north-up, right-forward-up and radians.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""RLlib trains both sides of the duel as docs/how-to/cluster.md shows it. Skipped without `ray[rllib]`, which CI has not."""
+"""RLlib trains both sides of the duel as docs/how-to/cluster.md shows it.
+
+Skipped without `ray[rllib]`, which CI has not.
+"""
 
 import re
 from pathlib import Path

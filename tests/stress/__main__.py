@@ -30,8 +30,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
         prog="python -m tests.stress",
-        description="Try to break the promises of docs/inside/reliability.md. Exit status: 0 where all held, 1 at the first "
-        "that is broken, 2 for a wrong option, 130 after Ctrl-C.",
+        description="Try to break the promises of docs/inside/reliability.md. Exit status: 0 where all held, 1 at "
+        "the first that is broken, 2 for a wrong option, 130 after Ctrl-C.",
     )
     add = result.add_argument
     add("--seed", type=seed_number, default=0, metavar="S", help="from which every try follows (default: %(default)s)")

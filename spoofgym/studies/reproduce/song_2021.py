@@ -104,9 +104,9 @@ READINGS = (
     "spoofs the fix at 151 s first.",
     f"The receiver's error has a time constant of 60 s and {SIGMA} m per axis, the filter's R alike: tuned to the "
     "0.59 m of the GNSS in table 6. What agrees with that figure is calibration.",
-    "set-a and set-b are two grades of wheels and yaw (docs/reference/robot.md); set-b is that of a prototype, tuned to the 5 m "
-    "of the paper's robot. Neither is in the paper. The lag of the filter is tuned to the EKF's largest error in "
-    "table 4.",
+    "set-a and set-b are two grades of wheels and yaw (docs/reference/robot.md); set-b is that of a prototype, tuned"
+    " to the 5 m of the paper's robot. Neither is in the paper. The lag of the filter is tuned to the EKF's largest "
+    "error in table 4.",
     "The auxiliary position is set to the filter's at every fix that is used, and runs free while fixes are left out.",
     "An alarm leaves the fix of its epoch out; GNSS is used again as soon as there is no alarm (steps 3 to 8).",
     "RIO is only cited: a gate of 4.3 m on one innovation, tuned in a prototype to its rows.",
