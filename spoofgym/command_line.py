@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from spoofgym import figures, files
+from spoofgym import figures, files, own_parts
 from spoofgym.validation import nearest
 
 STDOUT = "-"
@@ -180,6 +180,18 @@ def add_seed(parser: argparse.ArgumentParser, of: str, default: int = 0) -> None
 def add_threads(parser: argparse.ArgumentParser, default: int = 2) -> None:
     """The option ``--threads`` of a program that simulates."""
     parser.add_argument("--threads", type=threads, default=default, help="of the simulation (default: %(default)s)")
+
+
+def add_import(parser: argparse.ArgumentParser) -> None:
+    """The option ``--import`` of a program that takes parts by their names: one's own are known from then on."""
+    parser.add_argument(
+        "--import",
+        action="append",
+        type=own_parts.take,
+        metavar="MODULE",
+        dest="imported",
+        help="Python module that registers parts of your own; repeatable",
+    )
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

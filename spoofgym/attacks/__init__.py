@@ -46,12 +46,32 @@ def _around(make: Inside) -> dict[str, Callable[..., Attack]]:
             return make(attack)
 
     def tracking_error(attack: str, sigma: float = SIGMA, time: float = 0.0, axis: str | None = None) -> Attack:
+        """Another attack with the spoofer's own error in tracking the victim.
+
+        Args:
+            attack: the other one; "/" stands for its commas.
+            sigma: of the error per axis, m.
+            time: its correlation time, s; 0 = white.
+            axis: ``east``, ``north`` or ``up``, on which alone the spoofer errs; None = on all three.
+        """
         return TrackingError(inside("tracking-error", attack), sigma, time, axis)
 
     def position_only(attack: str) -> Attack:
+        """Another attack that spoofs positions and leaves the velocity of a fix as it is.
+
+        Args:
+            attack: the other one; "/" stands for its commas.
+        """
         return PositionOnly(inside("position-only", attack))
 
     def partial(attack: str, satellites: int | None = None, numbers: str | None = None) -> Attack:
+        """Another attack that captures some satellites only.
+
+        Args:
+            attack: the other one; "/" stands for its commas.
+            satellites: how many are captured: those in the first slots that hold one; 1 with nothing given.
+            numbers: of the satellites that are captured instead, with "+" between.
+        """
         return Partial(inside("partial", attack), satellites, numbers)
 
     return {"tracking-error": tracking_error, "position-only": position_only, "partial": partial}

@@ -153,9 +153,13 @@ class FoiScenario(Azimuth):
 
 
 def _scenario(number: int) -> Callable[[], Attack]:
+    onset, end, growth, azimuth = FOI_SCENARIOS[number]
+
     def build() -> Attack:
         return FoiScenario(number)
 
+    turned = f"{azimuth:g}° within {growth:g} s, from {onset:g} to {end:g} s"
+    build.__doc__ = f"The false azimuth of FOI-R-5687's scenario {number}: {turned} (FOI-R-5687, tables 1 and 7)."
     return build
 
 

@@ -46,6 +46,12 @@ class Command:
 
 STUDIES, LEARNING = "spoofgym.studies", "spoofgym.learning"
 SECTIONS: dict[str, tuple[Command, ...]] = {
+    "look": (
+        Command("list", "what there is to play with", "spoofgym.cli.list_parts"),
+        Command("play", "play one game and tell its story", "spoofgym.cli.play"),
+        Command("report", "a page to look at, of games and results", "spoofgym.report.program"),
+        Command("check", "whether it works here, for a bug report", "spoofgym.cli.check"),
+    ),
     "measure": (
         Command("evaluate spoofers", "spoofers beside baselines and the optimum", f"{STUDIES}.evaluate.spoofers"),
         Command("evaluate defenders", "defenders on populations of attacks", f"{STUDIES}.evaluate.defenders"),

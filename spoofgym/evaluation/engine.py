@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any, Protocol
 
-from spoofgym import validation
+from spoofgym import own_parts, validation
 
 OWNER = "engine"
 TRIES = 3
@@ -114,7 +114,9 @@ class Processes:
     ) -> list[int]:
         """Compute tasks; the places of those whose worker died, or never took them."""
         lost, whole = [], False
-        pool = self._pool or ProcessPoolExecutor(self._workers, mp_context=get_context("spawn"))
+        pool = self._pool or ProcessPoolExecutor(
+            self._workers, get_context("spawn"), own_parts.take_all, (own_parts.taken(),)
+        )
         try:
             begun: list[tuple[int, Task, Future[Any]]] = []
             for place, task in tasks:
@@ -173,7 +175,7 @@ class Ray:
         waiting = []
         for task in tasks:
             notify(task.name)
-            waiting.append(compute.remote(task))
+            waiting.append(compute.remote(task, own_parts.taken()))
         results, failures = [], []
         for task, reference in zip(tasks, waiting, strict=True):
             try:
@@ -197,7 +199,8 @@ def _knock(address: str | None) -> None:
         socket.create_connection((found[1], int(found[2])), PATIENCE).close()
 
 
-def _compute(task: Task) -> Any:
+def _compute(task: Task, own: Sequence[str]) -> Any:
+    own_parts.take_all(own)
     return task()
 
 

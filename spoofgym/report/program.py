@@ -1,7 +1,7 @@
 """Write one HTML page of games and results: figures that are read offline, on a phone, too.
 
-    python -m spoofgym.report.program evaluation.json matrix.json -o report.html
-    python -m spoofgym.report.program runs/league runs/seed0 runs/seed1 --title "The league of May" -o report.html
+    spoofgym report evaluation.json matrix.json -o report.html
+    spoofgym report runs/league runs/seed0 runs/seed1 --title "The league of May" -o report.html
 
 What it reads is JSON of the other programs and run folders; `spoofgym.report.sources` says which.
 """
@@ -17,13 +17,18 @@ from spoofgym.program import program
 from spoofgym.report.page import write_page
 
 DEFAULT_PAGE = "report.html"
+EXAMPLES = (
+    "spoofgym report evaluation.json matrix.json -o report.html",
+    "spoofgym report runs/league runs/seed0 runs/seed1 -o league.html",
+)
 
 
 def parser() -> Parser:
     """The command line."""
     result = Parser(
-        prog="python -m spoofgym.report.program",
+        prog="spoofgym report",
         description="Write one HTML page of games and results. It is complete in itself and needs no network.",
+        examples=EXAMPLES,
     )
     add = result.add_argument
     add("sources", nargs="+", metavar="FILE|RUN",
@@ -42,7 +47,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     write_page(options.out, [Path(source) for source in options.sources], options.title)
     print(f"page in {options.out}", file=sys.stderr)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,93 @@
+"""`spoofgym list` tells of every part what its own documentation says, with a spelling and a command that work."""
+
+import json
+import shlex
+
+import pytest
+
+from spoofgym.cli import play
+from spoofgym.cli.list_parts import KINDS, main
+from spoofgym.cli.parts import REGISTRIES, parts
+from spoofgym.detectors import make_detector
+from spoofgym.envs.opponents import make_spoofer
+from spoofgym.policies import published
+from spoofgym.responses import make_response
+from spoofgym.scenarios import make_scenario
+from tests.run_folders import spoofer
+
+MAKE = {"scenarios": make_scenario, "detectors": make_detector, "attacks": make_spoofer, "responses": make_response}
+
+
+@pytest.mark.parametrize("kind", REGISTRIES)
+def test_every_part_tells_what_it_is_and_can_be_built_as_spelled(kind):
+    for part in parts(kind):
+        assert len(part.told) > 10, part.name
+        assert not part.told.endswith("al")
+        if part.name != "recorded":
+            MAKE[kind](part.example)
+        words = shlex.split(part.command)
+        assert words[:2] == ["spoofgym", "play"]
+        play.seats(play.parser().parse_args(words[2:]))
+
+
+def test_options_have_defaults_units_and_words():
+    (ramp,) = [part for part in parts("attacks") if part.name == "ramp"]
+    rate, direction, onset = ramp.options
+    assert (rate.name, rate.default, rate.unit) == ("rate", "", "m/s")
+    assert (direction.default, onset.default, onset.unit) == ("90", "none", "s")
+    assert ramp.source == "Liu 2018, eq 14"
+    told = {option.name: option.told for part in parts("responses") for option in part.options}
+    assert all(told[name] for name in ("reuse", "reuse_threshold", "position_gate"))  # those of base classes, too
+
+
+@pytest.mark.parametrize("columns", ["80", "40"])
+@pytest.mark.parametrize("arguments", [[], ["detectors", "relative-motion"], ["scenarios", "liu-flight"]])
+def test_text_fits_the_terminal(arguments, columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main(arguments) == 0
+    lines = capsys.readouterr().out.partition("example:")[0].splitlines()
+    assert max(map(len, lines)) <= int(columns)
+
+
+def test_a_specification_tells_of_its_part(capsys):
+    assert main(["detectors", "cusum:k=2,arl0=1e4"]) == 0
+    assert capsys.readouterr().out.startswith("cusum (detector)")
+    assert main(["detectors", "cusm"]) == 2
+    assert "did you mean 'cusum'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_json_alone_on_stdout(kind, tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "agents"
+    folder.mkdir()
+    monkeypatch.setattr(published, "agents_folder", lambda: folder)
+    assert main([kind, "--json", "-"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["name"] for row in rows] == list(REGISTRIES.get(kind, ()))
+
+
+def test_a_run_folder_without_a_card_is_no_published_policy(tmp_path, capsys):
+    spoofer({"scenario": "liu-flight:horizon=5", "knowledge": "blind"}, tmp_path / "x")
+    assert main(["policies", str(tmp_path / "x")]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_parts_of_ones_own_are_listed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "parts_of_a_test.py").write_text(
+        "from spoofgym.detectors import DETECTORS\n"
+        "from spoofgym.detectors.chi_square import Snapshot\n"
+        "class Mine(Snapshot):\n"
+        "    '''A test of my own. It is like the other.'''\n"
+        "DETECTORS['mine'] = Mine\n"
+    )
+    try:
+        assert main(["detectors", "mine", "--import", "parts_of_a_test"]) == 0
+        assert "A test of my own." in capsys.readouterr().out
+    finally:
+        del REGISTRIES["detectors"]["mine"]
+    with pytest.raises(SystemExit) as ended:
+        main(["detectors", "--import", "no_such_module"])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "argument --import: 'no_such_module' cannot be imported: ModuleNotFoundError" in line
