@@ -25,6 +25,7 @@ from benchmarks import first_cell
 from spoofgym.command_line import STDOUT, Parser, add_json, count
 from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.native import NativeVectorEnv
+from spoofgym.envs.payoffs import make_payoff
 from spoofgym.envs.vector import DuelVectorEnv, SpooferVectorEnv
 from spoofgym.evaluation.cell_store import CellStore
 from spoofgym.evaluation.duels import play_cell
@@ -185,7 +186,8 @@ def forecast(tables: dict[str, Any], scenario: str) -> Iterable[dict[str, Any]]:
     learned = {row["what"]: row for row in tables["learners"] if row["scenario"] == scenario}
     training = options.spoofer_steps / learned["PPO spoofer"]["rate"] + learned["teachers compared"]["seconds"]
     training += options.defender_steps / learned["PPO defender"]["rate"]
-    spoofers, defenders = len(league.SPOOFERS), len(league.classical_defenders(make_scenario(scenario)))
+    made = make_scenario(scenario)
+    spoofers, defenders = len(league.SPOOFERS), len(league.classical_defenders(made, make_payoff(options.payoff, made)))
     for rounds in (0, 1, 5, 10):
         number = (spoofers + rounds) * (defenders + rounds)
         least = number * (setting_up + options.games * per_game)
