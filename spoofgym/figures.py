@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MISSING = "a figure needs matplotlib: pip install 'spoofgym[report]'"
+MISSING = "a figure needs matplotlib: pip install 'spoofgym[render]'"
 
 
 def can_draw() -> bool:

@@ -17,10 +17,12 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 NOT_NUMERICAL = (
     *("train", "policies", "learning", "kernels", "test_package.py", "test_readme.py", "test_tutorial.py"),
-    *("test_archive.py", "test_command_line.py", "test_console.py", "test_files.py", "test_program.py"),
+    *("test_archive.py", "test_command_line.py", "test_console.py", "test_files.py"),
+    "test_program.py",
     *("test_copies.py", "envs/test_copied_games.py", "envs/test_actions.py", "envs/test_sb3.py", "test_conftest.py"),
     *("envs/test_duel.py", "envs/test_duel_sides.py", "envs/test_frames.py", "envs/test_policies_within.py"),
-    *("envs/test_policy_opponents.py", "envs/test_trained.py", "envs/test_rendering.py", "scenarios/test_cache.py"),
+    *("envs/test_policy_opponents.py", "envs/test_trained.py", "scenarios/test_cache.py"),
+    *("envs/test_rendering.py", "envs/test_recording.py", "envs/test_spoofer_figure.py", "envs/test_window.py"),
     *("test_arguments.py", "test_cache_folder.py", "test_specification.py", "test_validation.py", "test_stress.py"),
     *("benchmarks", "calibration/test_cache.py", "calibration/test_play.py", "calibration/test_on_scenarios.py"),
     *("studies/test_acna.py", "studies/test_integrity.py", "studies/test_matrix.py", "studies/test_patient_spoofer.py"),

@@ -41,7 +41,7 @@ def test_hostile_arguments_are_played_or_refused_by_name():
         (SpooferEnv, {"tracking_time": 1e-320}, "Spoofer-v0: tracking_time must be"),
         (SpooferEnv, {"forfeit": "1"}, "Spoofer-v0: forfeit must be a finite number, 0 or more, got '1'"),
         (SpooferEnv, {"threads": 2.5}, "Spoofer-v0: threads must be a whole number, 1 or more, got 2.5"),
-        (SpooferEnv, {"render_mode": 5}, "SpooferEnv: render_mode must be one of rgb_array, got 5"),
+        (SpooferEnv, {"render_mode": 5}, "SpooferEnv: render_mode must be one of human, rgb_array, ansi, got 5"),
         (SpooferEnv, {"knowledge": np.array(["full"])}, "Spoofer-v0: knowledge must be one of"),
         (SpooferEnv, {"detector": "windowed:n=20,threshold=1e-6"}, "threshold 1e-06 of 'windowed:threshold=1e-06' is"),
         (DefenderEnv, {"error_clip": None}, "Defender-v0: error_clip must be"),

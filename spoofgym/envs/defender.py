@@ -6,8 +6,8 @@ from typing import Any
 
 from spoofgym.arrays import Flags
 from spoofgym.envs.config import DefenderConfig, configure
+from spoofgym.envs.defender_figure import DefenderFigure
 from spoofgym.envs.defender_game import DefenderGame
-from spoofgym.envs.defender_rendering import DefenderFigure
 from spoofgym.envs.single import SingleEnv
 
 
@@ -210,7 +210,7 @@ class DefenderEnv(SingleEnv):
     | `exclusion_cost` | `0.05` | of a clean fix left out |
     | `coupling` | `None` | "loose" (the filter takes fixes) or "tight" (ranges); None: what the scenario is |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
-    | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
+    | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 
     Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
     valid. Numbers have limits far beyond what a game needs, so that nothing overflows and memory stays in bounds:
@@ -233,10 +233,23 @@ class DefenderEnv(SingleEnv):
     statistics of a detector that is not among `detectors` (knowledge "full"), a scenario without a linear model
     (knowledge "shadow" on most recorded logs).
 
+    ## Rendering
+
+    | `render_mode` | What `render()` gives | Needs |
+    |---|---|---|
+    | "human" | None: a window shows the figure at every `reset` and `step` | `spoofgym[render]` |
+    | "rgb_array" | the figure of the game so far, (540, 960, 3) | `spoofgym[render]` |
+    | "ansi" | a line that tells the present epoch | nothing |
+
+    `gymnasium.wrappers.RecordVideo` makes a video of "rgb_array" (`spoofgym[render]` brings what it needs). The vector
+    environment shows the lanes that `render_lanes` says, the first ones (None: all of nine or fewer, else lane 0):
+    `gymnasium.wrappers.vector.RecordVideo` takes them all, or lane 0 with `record_first_only=True`, and SB3's
+    `VecVideoRecorder` those that are shown.
+
     ## Vectorized environment
 
     `gymnasium.make_vec("spoofgym:spoofgym/Defender-v0", num_envs=64)` builds the native `DefenderVectorEnv`, which
-    takes the same arguments but `render_mode`, and `autoreset_mode`. Lane i is bit-identical to the single environment
+    takes the same arguments, `autoreset_mode` and `render_lanes`. Lane i is bit-identical to the single environment
     seeded `seed + i`, for any number of lanes. `spoofgym.envs.sb3.SB3VecEnv` adapts it to Stable-Baselines3.
 
     ## Version History
@@ -249,7 +262,7 @@ class DefenderEnv(SingleEnv):
         self._check_render_mode(render_mode)
         self.config = configure(DefenderConfig, arguments)
         game = DefenderGame(self.config, 1)
-        super().__init__(game, render_mode, DefenderFigure(game) if render_mode == "rgb_array" else None)
+        super().__init__(game, render_mode, DefenderFigure)
 
     def action_masks(self) -> Flags:
         """Which values of the action are open, (M,), as MaskablePPO of sb3-contrib expects."""

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.envs.actions import as_numbers
 from spoofgym.envs.config import configure
-from spoofgym.envs.defender_rendering import DefenderFigure
+from spoofgym.envs.defender_figure import DefenderFigure
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import AGENTS, DEFENDER, SPOOFER, DuelGame, check_agents
+from spoofgym.envs.rendering import METADATA, Frame, Rendering, check_render_mode
 from spoofgym.envs.single import LANE, only_lane
 
 try:
@@ -138,10 +139,21 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     | `shadow` | `None` | scenario whose filter the spoofer takes for the victim's; None: the victim's own |
     | `coupling` | `None` | "loose" (the filter takes fixes) or "tight" (ranges); None: what the scenario is |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
-    | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
+    | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 
     Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
     valid. So is a `tracking_time` without a `tracking_sigma`.
+
+    ## Rendering
+
+    | `render_mode` | What `render()` gives | Needs |
+    |---|---|---|
+    | "human" | None: a window shows the figure at every `reset` and `step` | `spoofgym[render]` |
+    | "rgb_array" | the figure of the game so far, (540, 960, 3) | `spoofgym[render]` |
+    | "ansi" | a line that tells the present epoch | nothing |
+
+    The N lanes of `duel.vector_env` show those that `render_lanes` says, the first ones (None: all of nine or fewer,
+    else lane 0).
 
     ## One side, and many lanes
 
@@ -158,15 +170,13 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
 
     metadata: dict[str, Any] = {
         "name": "spoofgym_duel_v0",
-        "render_modes": ["rgb_array"],
-        "render_fps": 10,
+        **METADATA,
         "is_parallelizable": True,
     }
 
     def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """Set the game up; ``arguments`` are those of the environment's page."""
-        if render_mode is not None:
-            validation.one_of("duel", "render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        check_render_mode("duel", render_mode)
         self.config = configure(DuelConfig, arguments)
         self.game = DuelGame(self.config, 1)
         self.render_mode = render_mode
@@ -175,7 +185,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
         self._observation_spaces = dict(self.game.observation_space)
         self._action_spaces = dict(self.game.action_space)
         self.state_space = self._state_space()
-        self._figure = None if render_mode is None else DefenderFigure(self.game)
+        self._rendering = Rendering(render_mode, self.game, DefenderFigure)
         self._generator: np.random.Generator | None = None
 
     def _state_space(self) -> spaces.Box:
@@ -203,8 +213,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
             self.game.simulation.streams.replace(0, self._generator)
         self.game.reset(LANE)
         self.agents = list(self.possible_agents)
-        if self._figure is not None:
-            self._figure.restart()
+        self._rendering.restart(LANE)
         return self._observations(), only_lane(self.game.reset_values())
 
     def step(
@@ -229,8 +238,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
         }
         outcome = self.game.step(lanes)
         terminated, payoff = bool(outcome.terminated[0]), float(outcome.reward[0])
-        if self._figure is not None:
-            self._figure.record()
+        self._rendering.record()
         infos = only_lane(self.game.step_values(outcome))
         if terminated:
             self.agents = []
@@ -246,11 +254,10 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
         """Both observations and the true state, for a central critic in training."""
         return np.concatenate([*self._observations().values(), self.game.privileged()[0]])
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The figure of the game so far, (H, W, 3); None without a render mode."""
-        return None if self._figure is None else self._figure.draw()
+    def render(self) -> Frame | None:
+        """The figure of the game so far, (H, W, 3), or a line; None without a render mode, and in a window."""
+        return self._rendering.only_frame()
 
     def close(self) -> None:
-        """Free the figure."""
-        if self._figure is not None:
-            self._figure.close()
+        """Free the figure, and close the window."""
+        self._rendering.close()

@@ -6,7 +6,7 @@ from typing import Any
 
 from spoofgym.arrays import Flags
 from spoofgym.envs.config import configure
-from spoofgym.envs.defender_rendering import DefenderFigure
+from spoofgym.envs.defender_figure import DefenderFigure
 from spoofgym.envs.duel_config import DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.duel_game import DuelDefenderGame, DuelGame, DuelSpooferGame
 from spoofgym.envs.single import SingleEnv
@@ -17,7 +17,7 @@ class _SideEnv(SingleEnv):
 
     def __init__(self, game: DuelGame, render_mode: str | None) -> None:
         self.config = game.config
-        super().__init__(game, render_mode, None if render_mode is None else DefenderFigure(game))
+        super().__init__(game, render_mode, DefenderFigure)
 
 
 class DuelSpooferEnv(_SideEnv):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.envs.config import check_options, configure
+from spoofgym.envs.rendering import METADATA, FigureType, Frame, Rendering, check_render_lanes, check_render_mode
 from spoofgym.simulation import Simulation
 
 MOST_LANES = 20_000
@@ -84,18 +85,21 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         num_envs: lanes N.
         autoreset_mode: an `AutoresetMode` or its value; the default is Gymnasium's, NEXT_STEP.
         max_episode_steps: epochs after which a lane is truncated; None = never, the game ends by itself.
-        render_mode: None; only the single environment draws.
-        arguments: those of the single environment, but its render mode.
+        render_mode: of the single environment; `render` gives a frame per lane.
+        render_lanes: lanes that are shown, the first ones; None = all of nine or fewer lanes, lane 0 of more.
+        arguments: those of the single environment.
 
     Attributes:
         config_type: of the arguments.
         game_type: builds a game of N lanes from them.
+        figure_type: draws one lane of it.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = dict(METADATA)
 
     config_type: type
     game_type: Callable[[Any, int], Game]
+    figure_type: FigureType
 
     def __init__(
         self,
@@ -104,20 +108,19 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
+        render_lanes: int | None = None,
         **arguments: Any,
     ) -> None:
         """Set N lanes up.
 
         Raises:
-            ValueError: an argument out of range, or a render mode, which only the single environment has.
+            ValueError: an argument out of range.
+            DependencyNotInstalled: the render mode needs a package that is missing.
         """
         owner = type(self).__name__
         num_envs = validation.whole(owner, "num_envs", num_envs, 1, MOST_LANES)
-        if render_mode is not None:
-            raise ValueError(
-                f"{owner}: render_mode must be None, because the vector environment draws nothing, got "
-                f"{validation.shown(render_mode)}"
-            )
+        render_mode = check_render_mode(owner, render_mode)
+        shown_lanes = check_render_lanes(owner, render_lanes, num_envs, render_mode)
         if max_episode_steps is not None:
             max_episode_steps = validation.whole(owner, "max_episode_steps", max_episode_steps, 1)
         if not isinstance(autoreset_mode, AutoresetMode):
@@ -128,7 +131,8 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self.game: Any = type(self).game_type(self.config, num_envs)
         self.autoreset_mode = autoreset_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = None
+        self.render_mode = render_mode
+        self._rendering = Rendering(render_mode, self.game, type(self).figure_type, shown_lanes)
         self.single_observation_space = self.game.observation_space
         self.single_action_space = self.game.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -171,6 +175,7 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         self.game.reset(lanes)
         self._done[lanes] = False
         self._started[lanes] = True
+        self._rendering.restart(lanes)
         return self.game.observation(), self._reset_info(mask)
 
     def _seed_lane(self, lane: int, seed: int | None) -> None:
@@ -238,6 +243,7 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
 
     def _play(self, actions: NDArray[Any], restarting: Runs | None) -> tuple[Any, Flags]:
         outcome = self.game.step(actions, restarting)
+        self._rendering.record(restarting)
         truncated = np.zeros(self.num_envs, dtype=bool)
         if self._max_episode_steps is not None:
             truncated = self.game.index >= self._max_episode_steps
@@ -268,6 +274,7 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
         final_info = self._step_info(outcome, done)
         info = {} if done.all() else self._step_info(outcome, ~done)
         self.game.reset(np.flatnonzero(done))
+        self._rendering.restart(np.flatnonzero(done))
         _fill(info, self._reset_info(done), done)
         info |= {
             "final_obs": final_obs,
@@ -276,6 +283,21 @@ class NativeVectorEnv(VectorEnv[Observations, NDArray[Any], NDArray[Any]]):
             "_final_info": done.copy(),
         }
         return self.game.observation(), outcome.reward, outcome.terminated, truncated, info
+
+    def render(self) -> tuple[Frame | None, ...] | None:  # type: ignore[override]
+        """A frame per lane: the figure of its game so far, (H, W, 3), or a line.
+
+        Lanes that are not shown have None in place of it. None without a render mode, and where a window shows them.
+
+        Raises:
+            RuntimeError: there are figures to draw and a game has not begun.
+        """
+        frames = self._rendering.frames()
+        return None if frames is None else (*frames, *[None] * (self.num_envs - len(frames)))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free the figures, and close the window."""
+        self._rendering.close()
 
     def _reset_info(self, mask: Flags) -> dict[str, Any]:
         return _masked(self.game.reset_values(), mask)

@@ -50,6 +50,7 @@ class SB3VecEnv(VecEnv):
         self.vector_env = vector_env
         self._actions: Any = None
         super().__init__(vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space)
+        self.metadata = vector_env.metadata  # with the frames per second of a recording
 
     def reset(self) -> VecEnvObs:
         """Start new episodes in all lanes; seeds given by `seed` are used once.
@@ -102,11 +103,16 @@ class SB3VecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """``action_masks``, for MaskablePPO, where the vector environment has it, (D,) for each lane asked for.
+        """What a method gives for each lane asked for.
+
+        There are two: ``action_masks``, for MaskablePPO, where the vector environment has it, (D,), and ``render``.
 
         Raises:
             AttributeError: another method: lanes are no objects of their own.
         """
+        if method_name == "render":
+            frames = self.vector_env.render() or (None,) * self.num_envs
+            return [frames[lane] for lane in self._get_indices(indices)]
         if method_name == "action_masks" and self.has_attr(method_name):
             masks = self.vector_env.action_masks()  # type: ignore[attr-defined]
             return [masks[lane] for lane in self._get_indices(indices)]
@@ -117,8 +123,10 @@ class SB3VecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Nothing is drawn."""
-        return [None] * self.num_envs
+        """The figures of the lanes that are shown, which SB3 puts side by side; without them None per lane."""
+        if self.render_mode != "rgb_array":
+            return [None] * self.num_envs
+        return [frame for frame in self.vector_env.render() or () if isinstance(frame, np.ndarray)]
 
 
 def _lane(info: dict[str, Any], lane: int) -> dict[str, Any]:

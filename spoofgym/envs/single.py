@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -12,45 +12,29 @@ from spoofgym import validation
 from spoofgym.envs.actions import as_numbers
 from spoofgym.envs.config import check_options
 from spoofgym.envs.native import Game, Values
+from spoofgym.envs.rendering import METADATA, FigureType, Frame, Rendering, check_render_mode
 
 LANE = np.zeros(1, dtype=np.int64)
-
-
-class Figure(Protocol):
-    """Records lane 0 of a game and draws it."""
-
-    def restart(self) -> None:
-        """Forget the last game and record epoch 0 of the new one."""
-
-    def record(self) -> None:
-        """Keep the present epoch."""
-
-    def draw(self) -> NDArray[np.uint8]:
-        """The figure so far, (H, W, 3)."""
-
-    def close(self) -> None:
-        """Free what was drawn."""
 
 
 class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
     """One lane of a game."""
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = dict(METADATA)
 
-    def __init__(self, game: Game, render_mode: str | None, figure: Figure | None) -> None:
-        """Take a game of one lane."""
+    def __init__(self, game: Game, render_mode: str | None, figure: FigureType) -> None:
+        """Take a game of one lane; ``figure`` draws it."""
         self.game: Any = game
         self.observation_space = game.observation_space
         self.action_space = game.action_space
         self.render_mode = render_mode
-        self._figure = figure
+        self._rendering = Rendering(render_mode, game, figure)
         self._streamed: np.random.Generator | None = None
         self._playing = False
 
     @classmethod
     def _check_render_mode(cls, render_mode: str | None) -> None:
-        if render_mode is not None:
-            validation.one_of(cls.__name__, "render_mode", render_mode, tuple(cls.metadata["render_modes"]))
+        check_render_mode(cls.__name__, render_mode)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -68,8 +52,7 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
             self._streamed = self.np_random
         self.game.reset(LANE)
         self._playing = True
-        if self._figure is not None:
-            self._figure.restart()
+        self._rendering.restart(LANE)
         return self.game.observation()[0], only_lane(self.game.reset_values())
 
     def step(self, action: NDArray[Any]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -85,21 +68,23 @@ class SingleEnv(gym.Env[NDArray[np.float32], NDArray[Any]]):
         outcome = self.game.step(as_numbers("the action", action, self.action_space.shape)[None])
         terminated = bool(outcome.terminated[0])
         self._playing = not terminated
-        if self._figure is not None:
-            self._figure.record()
+        self._rendering.record()
         info = only_lane(self.game.step_values(outcome))
         if terminated:
             info |= only_lane(self.game.end_values(outcome))
         return self.game.observation()[0], float(outcome.reward[0]), terminated, False, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """The figure of the game so far, (H, W, 3); None without a render mode."""
-        return None if self._figure is None else self._figure.draw()
+    def render(self) -> Frame | None:
+        """The figure of the game so far, (H, W, 3), or a line; None without a render mode, and in a window.
+
+        Raises:
+            RuntimeError: there is a figure to draw and no game has begun.
+        """
+        return self._rendering.only_frame()
 
     def close(self) -> None:
-        """Free the figure."""
-        if self._figure is not None:
-            self._figure.close()
+        """Free the figure, and close the window."""
+        self._rendering.close()
 
 
 def only_lane(values: Values) -> dict[str, Any]:

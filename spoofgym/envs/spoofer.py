@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from spoofgym.envs.config import SpooferConfig, configure
-from spoofgym.envs.rendering import SpooferFigure
 from spoofgym.envs.single import SingleEnv
+from spoofgym.envs.spoofer_figure import SpooferFigure
 from spoofgym.envs.spoofer_game import SpooferGame
 
 
@@ -175,7 +175,7 @@ class SpooferEnv(SingleEnv):
     | `shadow` | `None` | scenario whose filter the spoofer takes for the victim's, see below; None: the victim's own |
     | `coupling` | `None` | "loose" (the filter takes fixes) or "tight" (ranges), see below; None: as the scenario is |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
-    | `render_mode` | `None` | "rgb_array": a figure of the game so far (needs `spoofgym[render]`) |
+    | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 
     Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
     valid. So is one that would have no effect: a `response` without `on_alarm="respond"`, a `forfeit` with it, and a
@@ -215,10 +215,23 @@ class SpooferEnv(SingleEnv):
     was trained to see. `detector` must therefore name the detectors that it was trained with, as they were spelled
     then, and the scenario must have as many backtrack depths; else the game is refused when it is built.
 
+    ## Rendering
+
+    | `render_mode` | What `render()` gives | Needs |
+    |---|---|---|
+    | "human" | None: a window shows the figure at every `reset` and `step` | `spoofgym[render]` |
+    | "rgb_array" | the figure of the game so far, (540, 960, 3) | `spoofgym[render]` |
+    | "ansi" | a line that tells the present epoch | nothing |
+
+    `gymnasium.wrappers.RecordVideo` makes a video of "rgb_array" (`spoofgym[render]` brings what it needs). The vector
+    environment shows the lanes that `render_lanes` says, the first ones (None: all of nine or fewer, else lane 0):
+    `gymnasium.wrappers.vector.RecordVideo` takes them all, or lane 0 with `record_first_only=True`, and SB3's
+    `VecVideoRecorder` those that are shown.
+
     ## Vectorized environment
 
     `gymnasium.make_vec("spoofgym:spoofgym/Spoofer-v0", num_envs=64)` builds the native `SpooferVectorEnv`, which
-    takes the same arguments but `render_mode`, and `autoreset_mode`. Lane i is bit-identical to the single
+    takes the same arguments, `autoreset_mode` and `render_lanes`. Lane i is bit-identical to the single
     environment seeded `seed + i`, for any number of lanes. `spoofgym.envs.sb3.SB3VecEnv` adapts it to
     Stable-Baselines3.
 
@@ -232,4 +245,4 @@ class SpooferEnv(SingleEnv):
         self._check_render_mode(render_mode)
         self.config = configure(SpooferConfig, arguments)
         game = SpooferGame(self.config, 1)
-        super().__init__(game, render_mode, SpooferFigure(game) if render_mode == "rgb_array" else None)
+        super().__init__(game, render_mode, SpooferFigure)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from spoofgym.arrays import Flags
 from spoofgym.envs.config import DefenderConfig, SpooferConfig
+from spoofgym.envs.defender_figure import DefenderFigure
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.duel_game import DuelDefenderGame, DuelGame, DuelSpooferGame
 from spoofgym.envs.native import NativeVectorEnv
+from spoofgym.envs.spoofer_figure import SpooferFigure
 from spoofgym.envs.spoofer_game import SpooferGame
 
 
@@ -16,6 +18,7 @@ class SpooferVectorEnv(NativeVectorEnv):
 
     config_type = SpooferConfig
     game_type = SpooferGame
+    figure_type = SpooferFigure
 
 
 class DefendingVectorEnv(NativeVectorEnv):
@@ -32,6 +35,7 @@ class DefenderVectorEnv(DefendingVectorEnv):
 
     config_type = DefenderConfig
     game_type = DefenderGame
+    figure_type = DefenderFigure
 
 
 class DuelSpooferVectorEnv(NativeVectorEnv):
@@ -39,6 +43,7 @@ class DuelSpooferVectorEnv(NativeVectorEnv):
 
     config_type = DuelSpooferConfig
     game_type = DuelSpooferGame
+    figure_type = DefenderFigure
 
 
 class DuelDefenderVectorEnv(DefendingVectorEnv):
@@ -46,6 +51,7 @@ class DuelDefenderVectorEnv(DefendingVectorEnv):
 
     config_type = DuelDefenderConfig
     game_type = DuelDefenderGame
+    figure_type = DefenderFigure
 
 
 class DuelVectorEnv(NativeVectorEnv):
@@ -57,3 +63,4 @@ class DuelVectorEnv(NativeVectorEnv):
 
     config_type = DuelConfig
     game_type = DuelGame
+    figure_type = DefenderFigure

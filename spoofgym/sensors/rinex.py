@@ -38,7 +38,7 @@ FIELDS = {
 
 
 def read_rinex(path: str | PathLike[str], time: float) -> Ephemeris:
-    """The GPS satellites of a navigation file of RINEX 2 or 3, read by RTKLIB (``pip install "spoofgym[rinex]"``).
+    """The GPS satellites of a navigation file of RINEX 2 or 3, read by RTKLIB (``pip install "spoofgym[logs]"``).
 
     Of each satellite the healthy set whose reference time is nearest to ``time`` is taken.
 
@@ -90,5 +90,5 @@ def _rtklib() -> Any:
     try:
         import pyrtklib
     except ImportError as error:
-        raise ImportError('a RINEX file needs pyrtklib: pip install "spoofgym[rinex]"') from error
+        raise ImportError('a RINEX file needs pyrtklib: pip install "spoofgym[logs]"') from error
     return pyrtklib

@@ -272,7 +272,7 @@ def test_privileged_state_tells_the_truth_and_is_no_part_of_the_observation() ->
         ({"depth": 3}, TypeError, "unknown argument 'depth'; valid arguments: scenario, attacks"),
         ({"fidelity": "exact"}, ValueError, "no fidelity 'exact'; valid fidelities: linear, strapdown"),
         ({"threads": 0}, ValueError, "threads must be a whole number, 1 or more"),
-        ({"render_mode": "human"}, ValueError, "render_mode must be one of rgb_array, got 'human'"),
+        ({"render_mode": "cinema"}, ValueError, "render_mode must be one of human, rgb_array, ansi, got 'cinema'"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, Any], error: type[Exception], message: str) -> None:

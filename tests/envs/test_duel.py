@@ -218,7 +218,7 @@ def test_a_picture_is_drawn() -> None:
         ({"detectors": ("snapshot", "snapshot")}, "duel: detectors: each detector can be given once only"),
         ({"detectors": "raim"}, "detector 'raim' needs"),
         ({"scenario": SKY, "action": "innovation"}, "use action='rate'"),
-        ({"render_mode": "human"}, "duel: render_mode must be"),
+        ({"render_mode": "cinema"}, "duel: render_mode must be one of human, rgb_array, ansi"),
     ],
 )
 def test_bad_arguments_are_refused_by_name(arguments: dict[str, Any], message: str) -> None:

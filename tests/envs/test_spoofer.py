@@ -142,7 +142,7 @@ def test_user_limit_truncates() -> None:
         ({"fidelity": "real"}, ValueError, "'real'.*linear, strapdown"),
         ({"on_alarm": "cry"}, ValueError, "on_alarm must be one of end, respond, got 'cry'"),
         ({"on_alarm": "respond", "response": "cry"}, ValueError, "'cry'.*exclude"),
-        ({"render_mode": "human"}, ValueError, "render_mode must be one of rgb_array, got 'human'"),
+        ({"render_mode": "cinema"}, ValueError, "render_mode must be one of human, rgb_array, ansi, got 'cinema'"),
         ({"forfeit": -1.0}, ValueError, "forfeit"),
         ({"forfeit": float("inf")}, ValueError, "forfeit"),
         ({"forfeit": float("nan")}, ValueError, "forfeit"),

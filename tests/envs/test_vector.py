@@ -141,7 +141,9 @@ def test_make_vec_builds_the_native_environment() -> None:
     ("arguments", "error", "message"),
     [
         ({"num_envs": 0}, ValueError, "num_envs"),
-        ({"render_mode": "rgb_array"}, ValueError, "render_mode"),
+        ({"render_mode": "cinema"}, ValueError, "render_mode must be one of human, rgb_array, ansi, got 'cinema'"),
+        ({"render_lanes": 1}, ValueError, "render_lanes has an effect with a render_mode only"),
+        ({"render_mode": "ansi", "num_envs": 3, "render_lanes": 4}, ValueError, "render_lanes must be .* 3 at most"),
         ({"max_episode_steps": 0}, ValueError, "max_episode_steps"),
         ({"autoreset_mode": "never"}, ValueError, "never"),
         ({"colour": "red"}, TypeError, "'colour'.*scenario"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spoofgym.envs.figure import ALARM, SAFE, STATISTICS, GameFigure, scale_ratios
+from spoofgym.envs.game_figure import ALARM, SAFE, STATISTICS, GameFigure, scale_ratios
 from spoofgym.geodesy import horizontal
 
 if TYPE_CHECKING:
@@ -20,17 +20,16 @@ BANDS = (("attack", OFFSET, 0.18), ("multipath", "#e69f00", 0.25), ("outage", "0
 
 
 class DefenderFigure(GameFigure):
-    """Records lane 0 of a game and draws it.
+    """Records one lane of a game with a defender and draws it.
 
     Raises:
         DependencyNotInstalled: matplotlib is missing.
     """
 
-    def __init__(self, game: DefenderGame | DuelGame) -> None:
-        """Prepare to record ``game``."""
-        super().__init__(game.simulation)
+    def __init__(self, game: DefenderGame | DuelGame, lane: int) -> None:
+        """Prepare to record a lane of ``game``."""
+        super().__init__(game.simulation, lane)
         self._game = game
-        self.restart()
 
     def restart(self) -> None:
         """Forget the last game and record epoch 0 of the new one."""
@@ -39,21 +38,21 @@ class DefenderFigure(GameFigure):
 
     def record(self) -> None:
         """Keep the present epoch and what was decided on the one before."""
-        game, epoch = self._game, self._game.simulation.epoch
+        game, lane, epoch = self._game, self._lane, self._simulation.epoch
         assert epoch.available is not None
         assert epoch.view is not None
         if self._rows:
-            self._decided.append((bool(game.excluding[0]), int(game.simulation.navigator.backtracked[0])))
-        covariance = epoch.view.position_covariance[0]
+            self._decided.append((bool(game.excluding[lane]), int(game.simulation.navigator.backtracked[lane])))
+        covariance = epoch.view.position_covariance[lane]
         self._rows.append(
             (
-                epoch.time[0],
-                game.error[0],
-                float(horizontal(game.simulation.offset[0])),
+                epoch.time[lane],
+                game.error[lane],
+                float(horizontal(game.simulation.offset[lane])),
                 float(np.sqrt(covariance[0, 0] + covariance[1, 1])),
-                float(game.attacked[0]),
-                float(game.confounders.multipath[0, epoch.index[0]]),
-                float(not epoch.available[0]),
+                float(game.attacked[lane]),
+                float(game.confounders.multipath[lane, epoch.index[lane]]),
+                float(not epoch.available[lane]),
                 *self._ratios(),
             )
         )

@@ -1,4 +1,4 @@
-"""What the pictures of both games have in common: lane 0 is recorded epoch by epoch and drawn into one figure."""
+"""What the figures of both games have in common: a lane is recorded epoch by epoch and drawn into one figure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from numpy.typing import NDArray
 
-from spoofgym.figures import new_figure, pixels
+from spoofgym.figures import can_draw, new_figure, pixels
 from spoofgym.simulation import Simulation
 
 STATISTICS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -21,19 +21,17 @@ LARGEST_LINEAR = 5.0
 
 
 class GameFigure(ABC):
-    """Records lane 0 of a game and draws it.
+    """Records one lane of a game and draws it.
 
     Raises:
         DependencyNotInstalled: matplotlib is missing.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Prepare to record a simulation."""
-        try:
-            self._figure = new_figure(9.6, 5.4, dpi=100)
-        except ImportError as error:
-            raise DependencyNotInstalled("rendering needs matplotlib: pip install 'spoofgym[render]'") from error
-        self._simulation = simulation
+    def __init__(self, simulation: Simulation, lane: int) -> None:
+        """Prepare to record a lane of a simulation."""
+        require_matplotlib()
+        self._figure = new_figure(9.6, 5.4, dpi=100)
+        self._simulation, self._lane = simulation, lane
         self._names = list(simulation.detectors)
         self._rows: list[tuple[float, ...]] = []
 
@@ -42,12 +40,23 @@ class GameFigure(ABC):
         self._rows = []
         self.record()
 
+    @property
+    def begun(self) -> bool:
+        """Whether there is anything to draw."""
+        return bool(self._rows)
+
     @abstractmethod
     def record(self) -> None:
         """Keep the present epoch."""
 
     def draw(self) -> NDArray[np.uint8]:
-        """The figure so far, (540, 960, 3)."""
+        """The figure so far, (540, 960, 3).
+
+        Raises:
+            RuntimeError: no game has begun.
+        """
+        if not self.begun:
+            raise RuntimeError("no game has begun: call reset() first")
         self._figure.clear()
         self._draw(np.array(self._rows))
         return pixels(self._figure)
@@ -61,13 +70,23 @@ class GameFigure(ABC):
         self._figure.clear()
 
     def _ratios(self) -> list[float]:
-        """Each statistic of lane 0 over its threshold."""
-        simulation = self._simulation
-        return [float(simulation.epoch.statistics[n][0] / d.threshold) for n, d in simulation.detectors.items()]
+        """Each statistic of the lane over its threshold."""
+        simulation, lane = self._simulation, self._lane
+        return [float(simulation.epoch.statistics[n][lane] / d.threshold) for n, d in simulation.detectors.items()]
 
     def _headline(self, text: str, **options: Any) -> None:
         """Write a line above all panels."""
         self._figure.suptitle(text, fontsize=13, fontweight="bold", y=0.975, **options)
+
+
+def require_matplotlib() -> None:
+    """Refuse to go on without matplotlib.
+
+    Raises:
+        DependencyNotInstalled: it is missing.
+    """
+    if not can_draw():
+        raise DependencyNotInstalled("rendering needs matplotlib: pip install 'spoofgym[render]'")
 
 
 def scale_ratios(axes: Any, ratios: NDArray[np.float64], headroom: float, label: str | None = None) -> None:
