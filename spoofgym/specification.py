@@ -164,6 +164,19 @@ def build(text: str, registry: Mapping[str, Callable[..., Part]], kind: str) -> 
         raise ValueError(f"{kind} {specification.name!r}: {error}") from error
 
 
+def registered_by_others(registry: Mapping[str, Callable[..., Any]]) -> tuple[str, ...]:
+    """The names of parts that somebody else has registered, as far as they can be spelled without a value.
+
+    They stand beside ours in the defaults of programs.
+    """
+    return tuple(
+        name
+        for name, factory in registry.items()
+        if not getattr(factory, "__module__", "").startswith("spoofgym.")
+        and all(each.default is not each.empty for each in inspect.signature(factory).parameters.values())
+    )
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """The message about a part whose name is unknown: the nearest valid name, if any is near, and all of them."""
     names = sorted(valid)

@@ -1,21 +1,22 @@
-"""What a learned policy is worth in the environment that it was trained on, as its card tells it."""
+"""What a policy is worth in an environment: a learned one in its own, as its card tells it, or any callable."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Floats
 from spoofgym.detectors import make_detector
-from spoofgym.envs.config import DefenderConfig, SpooferConfig
+from spoofgym.envs.config import DefenderConfig, SpooferConfig, configure
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.duel_config import DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.duel_game import DuelDefenderGame, DuelSpooferGame
 from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.envs.trained import AnyConfig, trained_on
+from spoofgym.envs.trained import ENVIRONMENTS, AnyConfig, trained_on
 from spoofgym.evaluation.episodes import Act, batches
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.policies.card import Score
@@ -47,6 +48,38 @@ def agent_scores(policy: LearnedSpoofer | LearnedDefender, games: int = GAMES, s
     if isinstance(config, DefenderConfig):
         cases = [replace(config, attacks=population) for population in POPULATIONS]
     return tuple(_score(case, policy.act, games, seed) for case in cases)
+
+
+def evaluate_policy(
+    act: Act,
+    env_arguments: Mapping[str, Any] | None = None,
+    environment: str = "spoofgym/Spoofer-v0",
+    games: int = GAMES,
+    seed: int = SEED,
+) -> Score:
+    """Score any callable: in its environment, with a 95 % interval, on the games that everybody else meets.
+
+    For example, of a policy of Stable-Baselines3::
+
+        model = PPO.load("mine.zip")
+        score = evaluate_policy(lambda o: model.predict(o, deterministic=True)[0], {"scenario": "liu-flight"})
+
+    Args:
+        act: actions for observations (N, D), float32, of N games at once. It is called once an epoch, also with the
+            games that have ended.
+        env_arguments: of the environment, as `gymnasium.make` takes them.
+        environment: its id: spoofgym/Spoofer-v0, Defender-v0, DuelSpoofer-v0 or DuelDefender-v0.
+        games: how many; game i is seeded ``seed + i``.
+        seed: of game 0.
+
+    Returns:
+        The mean undetected error of a spoofer, the mean error of a defender, the harm of a duel.
+
+    Raises:
+        ValueError: an environment that is unknown or cannot be built, or no games.
+    """
+    validation.one_of("evaluate_policy", "environment", environment, tuple(ENVIRONMENTS))
+    return _score(configure(ENVIRONMENTS[environment], dict(env_arguments or {})), act, games, seed)
 
 
 def _score(config: AnyConfig, act: Act, games: int, seed: int) -> Score:

@@ -13,7 +13,7 @@ from spoofgym.calibration import calibrated_for_play
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.defender_game import DefenderGame
-from spoofgym.envs.opponents import make_defender
+from spoofgym.envs.opponents import make_defender, spoofer_pool
 from spoofgym.envs.trained import defender_config
 from spoofgym.evaluation.defence import (
     DefenceEpisodes,
@@ -39,9 +39,43 @@ LEARNED_MEAN = "mean of the learned"
 """Stands for all learned defenders of a comparison: their mean error in each game."""
 
 
+YARDSTICKS = ("never", "always", "random", "oracle-onset", ORACLE_DEPTH)
+
+
 def fits(detector: str, scenario: Scenario) -> bool:
     """Whether a scenario offers what the detector of a specification needs."""
     return set(make_detector(detector).needs) <= set(scenario.offers)
+
+
+@dataclass(frozen=True)
+class Company:
+    """Who plays beside the defenders that are evaluated.
+
+    Attributes:
+        published: defenders of the literature.
+        tuned: on the attacks of the training population.
+        yardsticks: names of `YARDSTICKS`.
+        detectors: that run beside every defender, so that the same episode begins the same in every evaluation.
+    """
+
+    published: tuple[ClassicalDefender, ...] = ()
+    tuned: tuple[ClassicalDefender, ...] = ()
+    yardsticks: tuple[str, ...] = ()
+    detectors: tuple[str, ...] = ()
+
+
+NOBODY = Company()
+
+
+def everybody(scenario: Scenario) -> Company:
+    """All yardsticks, and all classical defenders and `WORLD_DETECTORS` that fit a scenario."""
+    listed = listed_for(scenario)
+    return Company(tuple(listed["published"]), tuple(listed["tuned"]), YARDSTICKS, common_detectors(scenario))
+
+
+def common_detectors(scenario: Scenario) -> tuple[str, ...]:
+    """Those of `WORLD_DETECTORS` that fit a scenario."""
+    return tuple(name for name in WORLD_DETECTORS if fits(name, scenario))
 
 
 def listed_for(scenario: Scenario) -> dict[str, list[ClassicalDefender]]:
@@ -70,17 +104,17 @@ def world_of(
     attacks: str,
     fidelity: str,
     threads: int,
+    common: Sequence[str],
     policies: Sequence[LearnedDefender],
     classical: Sequence[ClassicalDefender],
 ) -> World:
     """The world of an evaluation: half of the games are clean.
 
-    Of `WORLD_DETECTORS` those run that fit the scenario.
+    The detectors of all players run, and those that are ``common`` to all evaluations.
 
     Raises:
         ValueError: a detector cannot be built, or one that a policy or a defender watches does not fit the scenario.
     """
-    common = [name for name in WORLD_DETECTORS if fits(name, scenario)]
     wanted = [str(part) for policy in policies for part in _watched(policy)]
     names = dict.fromkeys([*common, *wanted, *(item.detector for item in classical)])
     built = {detector.name: detector for detector in map(make_detector, names)}
@@ -144,11 +178,7 @@ class Defenders:
         self._world, self._episodes, self._seed, self._progress = world, episodes, seed, progress
 
     def play(
-        self,
-        published: Sequence[ClassicalDefender],
-        tuned: Sequence[ClassicalDefender],
-        given: Sequence[ClassicalDefender],
-        policies: Sequence[LearnedDefender],
+        self, company: Company, given: Sequence[ClassicalDefender], policies: Sequence[LearnedDefender]
     ) -> Iterator[Played]:
         """All games of all defenders, one defender after the other."""
         world, episodes, seed = self._world, self._episodes, self._seed
@@ -156,16 +186,17 @@ class Defenders:
             "never": lambda: play_never(world, episodes, seed),
             "always": lambda: play_always(world, episodes, seed),
             "random": lambda: play_random(world, episodes, seed),
+            "oracle-onset": lambda: play_oracle_onset(world, episodes, seed),
         }
-        for name, play in yardsticks.items():
-            yield self._played(name, "yardstick", play)
-        for kind, classical in (("published", published), ("tuned", tuned), ("given", given)):
+        best = next((item for item in company.tuned if "onset" not in item.response), None)
+        if best is not None:
+            yardsticks[ORACLE_DEPTH] = lambda: self.oracle_depth(best)
+        for name in company.yardsticks:
+            if name in yardsticks:
+                yield self._played(name, "yardstick", yardsticks[name])
+        for kind, classical in (("published", company.published), ("tuned", company.tuned), ("given", given)):
             for defender in classical:
                 yield self._played(defender.name, kind, partial(self._classical, defender))
-        yield self._played("oracle-onset", "yardstick", lambda: play_oracle_onset(world, episodes, seed))
-        best = next((item for item in tuned if "onset" not in item.response), None)
-        if best is not None:
-            yield self._played(ORACLE_DEPTH, "yardstick", lambda: self.oracle_depth(best))
         for policy in policies:
             games = partial(play_policy, world, defender_config(policy), policy.act, episodes, seed)
             yield self._played(policy.name, "learned", games)
@@ -200,10 +231,9 @@ def _better(one: DefenceEpisodes, other: DefenceEpisodes) -> DefenceEpisodes:
     )
 
 
-def rows(played: Played, held_out: bool) -> list[dict[str, Any]]:
-    """The rows of one defender: each attack by itself, games without one, and all games pooled."""
+def rows(played: Played, held_out: bool, pooled: str) -> list[dict[str, Any]]:
+    """The rows of one defender: each attack by itself, games without one, and all games, which ``pooled`` names."""
     episodes = played.episodes
-    pooled = "all-held-out" if held_out else "all-training"
     parts = [(pooled, np.ones(len(episodes.member), dtype=bool)), ("none", episodes.member < 0)]
     parts += [(name, episodes.member == place) for place, name in enumerate(episodes.names)]
     return [
@@ -267,6 +297,7 @@ def evaluate_defenders(
     policies: Sequence[LearnedDefender],
     given: Sequence[ClassicalDefender],
     populations: Sequence[str],
+    company: Company,
     episodes: int,
     seed: int,
     threads: int,
@@ -278,39 +309,45 @@ def evaluate_defenders(
         scenario: of the games.
         fidelity: of the simulation.
         policies: learned defenders.
-        given: classical ones beside those that are always played.
-        populations: names of `POPULATIONS`.
+        given: classical ones beside those of the company.
+        populations: names of `POPULATIONS`, or one attack.
+        company: who plays beside them: `everybody`, or `NOBODY`.
         episodes: games per population and defender.
         seed: of game 0.
         threads: of the simulation.
         progress: shows what is played.
 
     Raises:
-        ValueError: a given defender that is unknown, two policies of one name, one that was trained on another
+        ValueError: nobody plays, a given defender that is unknown, two policies of one name, one that was trained on another
             observation, or one or a given defender whose detector does not fit the scenario.
     """
     check_names(policies)
     for defender in given:
         make_detector(defender.detector)
         make_defender(defender.response, scenario, ())
-    listed = listed_for(scenario)
+    for population in populations:
+        spoofer_pool(population, 0.5)
+    if company == NOBODY and not given and not policies:
+        raise ValueError("there is no defender to evaluate: name one")
     kinds: dict[str, str] = {}
     report_rows, pairs, gaps = [], [], []
     for population in populations:
-        held_out = POPULATIONS[population]
+        held_out = POPULATIONS.get(population, False)
+        pooled = f"all-{population}" if population in POPULATIONS else "all-games"
         with progress("thresholds of the detectors"):
-            world = world_of(scenario, population, fidelity, threads, policies, given)
+            world = world_of(scenario, population, fidelity, threads, company.detectors, policies, given)
         check_policies(world, policies)
         games = Defenders(world, episodes, seed, progress)
-        played = list(games.play(listed["published"], listed["tuned"], given, policies))
+        played = list(games.play(company, given, policies))
         learned = [item for item in played if item.kind == "learned"]
         for item in played:
             kinds[item.name] = item.kind
-            report_rows += rows(item, held_out)
+            report_rows += rows(item, held_out, pooled)
         if learned:
             pairs += comparisons(learned, [item for item in played if item.kind != "learned"], held_out)
         gaps += _gaps(played, held_out)
-    return defenders_report(scenario, fidelity, kinds, report_rows, pairs, gaps)
+    report = defenders_report(scenario, fidelity, kinds, report_rows, pairs, gaps)
+    return report if set(populations) <= set(POPULATIONS) else {**report, "attack": populations[0]}
 
 
 def _gaps(played: Sequence[Played], held_out: bool) -> list[dict[str, Any]]:

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from spoofgym.attacks import ATTACKS as KNOWN_ATTACKS
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
+from spoofgym.detectors import DETECTORS as KNOWN_DETECTORS
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.opponents import make_spoofer
@@ -22,6 +24,7 @@ from spoofgym.evaluation.seeds import seed_rows
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.optimal import ORACLES, oracles
 from spoofgym.scenario import Scenario
+from spoofgym.specification import registered_by_others
 
 DETECTORS = (
     "snapshot",
@@ -98,8 +101,9 @@ class Matrix:
         """The whole ``"matrix"`` report.
 
         Args:
-            detectors: specifications; none = `DETECTORS`.
-            attacks: specifications, or names of `ORACLES`; none = `ATTACKS` and all oracles.
+            detectors: specifications; none = `DETECTORS`, and those that somebody else has registered.
+            attacks: specifications, or names of `ORACLES`; none = `ATTACKS` and all oracles, and those that somebody
+                else has registered.
             policies: learned spoofers.
             progress: shows what is played.
 
@@ -112,7 +116,7 @@ class Matrix:
         with progress("attacks"):
             scripted = self._attacks(attacks)
         with progress("thresholds"):
-            ready = self._detectors(detectors or DETECTORS)
+            ready = self._detectors(detectors or (*DETECTORS, *registered_by_others(KNOWN_DETECTORS)))
         clean = self._play(make_attack(CLEAN), ready, progress)
         rows, curves = matrix_rows(ready, CLEAN, clean), []
         for attack in (*scripted, *(PolicySpoofer(policy) for policy in policies)):
@@ -136,7 +140,7 @@ class Matrix:
         return [attack.name for attack in self._attacks(attacks)] + [policy.name for policy in policies]
 
     def _attacks(self, given: Sequence[str]) -> list[Attack]:
-        asked = given or (*ATTACKS, *ORACLES)
+        asked = given or (*ATTACKS, *ORACLES, *registered_by_others(KNOWN_ATTACKS))
         known: dict[str, Attack] = {}
         if any(text in ORACLES for text in asked):
             known = {attack.name: attack for attack in oracles(self.scenario, self.arl0)}

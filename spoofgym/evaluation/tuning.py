@@ -7,7 +7,7 @@ from typing import Any
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.defence import play_response
 from spoofgym.evaluation.defence_metrics import defender_score
-from spoofgym.evaluation.defenders import world_of
+from spoofgym.evaluation.defenders import common_detectors, world_of
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.policies.classical import grid
@@ -27,7 +27,7 @@ def tuning_report(
         threads: of the simulation.
         progress: shows who plays.
     """
-    world = world_of(scenario, "training", "linear", threads, (), grid())
+    world = world_of(scenario, "training", "linear", threads, common_detectors(scenario), (), grid())
     rows: list[dict[str, Any]] = []
     for defender in grid():
         with progress(defender.name):

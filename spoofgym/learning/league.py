@@ -18,7 +18,18 @@ from functools import partial
 from pathlib import Path
 
 from spoofgym.attacks.base import KNOWLEDGE
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, count, run_folder, seed_number, share, threads
+from spoofgym.command_line import (
+    STDOUT,
+    Parser,
+    add_figure,
+    add_import,
+    add_json,
+    count,
+    run_folder,
+    seed_number,
+    share,
+    threads,
+)
 from spoofgym.console import console, show
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.payoffs import Beyond, Payoff, make_payoff
@@ -76,6 +87,7 @@ def parser() -> argparse.ArgumentParser:
     add_engine(result)
     add("--threads", type=threads, default=1, help="of learners and simulations (default: %(default)s)")
     add("--out", type=run_folder, default=Path("runs/league"), help="folder of the league (default: %(default)s)")
+    add_import(result)
     add_json(result)
     add_figure(result)
     return result

@@ -17,11 +17,12 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from spoofgym import files
+from spoofgym import files, own_parts
 from spoofgym.command_line import (
     LARGEST_LEARNER_SEED,
     MOST_COUNT,
     MOST_THREADS,
+    add_import,
     count,
     learner_seed,
     run_folder,
@@ -33,7 +34,7 @@ from spoofgym.policies.learned import CONFIG_FILE, environment_of, read_config
 
 CHECKPOINT_FILE = "checkpoint.pt"
 DEFAULT_STEPS = 3_200_000
-NO_SETTINGS = ("out", "resume", "threads")
+NO_SETTINGS = ("out", "resume", "threads", "imported")
 """Options that say where and how a run is computed, not what it is."""
 
 
@@ -83,6 +84,7 @@ def add_options(parser: argparse.ArgumentParser, folder: str) -> None:
     add("--resume", action="store_true", default=False,
         help="go on from the last checkpoint in the run folder, or start again where there is none yet, with the "
         "settings of the run; an option that contradicts them is refused")
+    add_import(parser)
 
 
 class RunFolder:
@@ -232,12 +234,13 @@ class RunFolder:
     @property
     def command(self) -> str:
         """The command that goes on with this run."""
-        return f"spoofgym train {self._program.rpartition('.')[2]} --resume --out {shlex.quote(str(self.path))}"
+        own = "".join(f" --import {shlex.quote(module)}" for module in own_parts.taken())
+        return f"spoofgym train {self._program.rpartition('.')[2]} --resume --out {shlex.quote(str(self.path))}{own}"
 
 
 def given_options(options: argparse.Namespace) -> dict[str, Any]:
     """The options of a command line that are settings of a run, and the number of threads."""
-    return {name: value for name, value in vars(options).items() if name not in ("out", "resume")}
+    return {name: value for name, value in vars(options).items() if name not in ("out", "resume", "imported")}
 
 
 def _seed(value: Any) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from spoofgym.detectors import DETECTORS
 from spoofgym.responses import RESPONSES
-from spoofgym.specification import Specification
+from spoofgym.specification import Specification, registered_by_others
 
 SEPARATOR = " > "
 SLASH = "/"
@@ -68,6 +68,9 @@ def keeps_within(limit: float) -> str:
     return f"multiple-hypothesis:ahead=30,hidden=0.7,amplitude=3,limit={limit:g}"
 
 
+OWN_ALARM = "windowed:n=20"
+"""Which a response of somebody else follows, where nobody says otherwise."""
+
 GRID_DETECTORS = ("windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
 GRID_DEPTHS = (0, 10, 20, 50)
 GRID_REUSES = (0, 5, 12)
@@ -88,9 +91,11 @@ TUNED = {
 
 
 def grid() -> list[ClassicalDefender]:
-    """Every defender of the grid."""
+    """Every defender of the grid; detectors and responses that somebody else has registered are part of it."""
     result = []
-    for detector in GRID_DETECTORS:
+    for detector in (*GRID_DETECTORS, *registered_by_others(DETECTORS)):
+        for response in registered_by_others(RESPONSES):
+            result.append(ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response, True))
         for reuse in GRID_REUSES:
             option = f"reuse={reuse}" if reuse else ""
             for depth in GRID_DEPTHS:
@@ -99,6 +104,13 @@ def grid() -> list[ClassicalDefender]:
             response = "onset-depth" + (f":{option}" if option else "")
             result.append(ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response, True))
     return result
+
+
+def own_defenders() -> list[ClassicalDefender]:
+    """Detectors that somebody else has registered, with the plainest response, and such responses to a usual alarm."""
+    pairs = [(name, "exclude") for name in registered_by_others(DETECTORS)]
+    pairs += [(OWN_ALARM, name) for name in registered_by_others(RESPONSES)]
+    return [ClassicalDefender(f"{detector}{SEPARATOR}{response}", detector, response) for detector, response in pairs]
 
 
 def with_depth(depth: int, options: str = "") -> str:

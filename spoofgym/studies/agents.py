@@ -19,7 +19,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from spoofgym.command_line import Parser, count, output
+from spoofgym.command_line import Parser, add_import, count, output
 from spoofgym.console import console, show
 from spoofgym.evaluation.agent_scores import agent_scores
 from spoofgym.policies.card import Card, Score, read_card
@@ -45,6 +45,7 @@ def parser() -> argparse.ArgumentParser:
     add("--check", action="store_true", help="let each play again, and compare with its card")
     add("--games", type=count, help="with --check: against each opponent (default: as many as the card tells)")
     add("--write", metavar="FILE", type=output, help="page whose table is replaced, between its two marks")
+    add_import(result)
     return result
 
 

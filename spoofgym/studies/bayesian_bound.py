@@ -17,7 +17,7 @@ from typing import Any
 
 from rich.table import Table
 
-from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, count, run_folder, share
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, count, run_folder, share
 from spoofgym.console import console, show
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.bayesian_bound import BoundSettings, bound_games, bound_report, same_games
@@ -57,6 +57,7 @@ def parser() -> argparse.ArgumentParser:
     add("--workers", type=count, help="processes (default: one for each core)")
     add_seed(result, "game 0")
     add("--out", type=run_folder, default=Path("runs/bound"), help="folder of the games (default: %(default)s)")
+    add_import(result)
     add_json(result)
     return result
 

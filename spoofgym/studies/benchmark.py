@@ -24,7 +24,7 @@ from typing import Any
 
 from rich.table import Table
 
-from spoofgym.command_line import STDOUT, Parser, add_json, count, output, run_folder
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json, count, output, run_folder
 from spoofgym.console import console, show
 from spoofgym.evaluation.benchmark import ATTACK, DEFEND, TRACKS
 from spoofgym.evaluation.benchmark_play import Matches
@@ -77,6 +77,7 @@ def parser() -> argparse.ArgumentParser:
             add("--write", metavar="FILE", type=output,
                 help="page whose tables are replaced, between their marks; rows are kept beside it as JSON")
             add("--again", action="store_true", help="take no row from the JSON file")
+        add_import(command)
         add("--workers", type=count, help="processes (default: one for each core)")
         add("--out", type=run_folder, default=Path("runs/benchmark"),
             help="folder of the games (default: %(default)s)")

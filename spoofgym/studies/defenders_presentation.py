@@ -57,11 +57,12 @@ def defenders_tables(report: dict[str, Any]) -> Group:
         of_set = [row for row in report["rows"] if row["held_out"] == held_out]
         pooled = sorted((row for row in of_set if _is_pooled(row)), key=lambda row: float(row["mean_error_m"]))
         if pooled:
-            title = f"{report['scenario']}, {report['fidelity']}: {population} attacks, half of the games clean"
+            attacks = report.get("attack") or f"{population} attacks"
+            title = f"{report['scenario']}, {report['fidelity']}: {attacks}, half of the games clean"
             parts += [_table(title, "defender", pooled, learned), ""]
         if pooled and learned:
             by_attack = [row for row in of_set if row["defender"] == learned[0] and not _is_pooled(row)]
-            parts += [_table(f"{learned[0]} by attack: {population}", "attack", by_attack, []), ""]
+            parts += [_table(f"{learned[0]} by attack: {attacks}", "attack", by_attack, []), ""]
     parts += [Text(LEGEND, style="dim italic"), ""]
     if learned:
         parts += [_comparisons(report, learned), ""]
@@ -173,6 +174,7 @@ def defenders_figure(report: dict[str, Any], path: Path) -> None:
         tick.set_fontweight("bold" if report["kinds"][row["defender"]] == "learned" else "normal")
     axes.set_xlabel("mean horizontal error of the real-time output, m (95 % interval)")
     words = "attacks that no defender was trained on" if held_out else "attacks of the training population"
+    words = report.get("attack") or words
     axes.set_title(f"{plain(report['scenario'])}, {report['fidelity']}: {words}")
     axes.legend(loc="upper right", fontsize=8, frameon=True)
     for side in ("top", "right"):

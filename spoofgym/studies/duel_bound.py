@@ -14,7 +14,7 @@ from typing import Any
 
 from rich.table import Table
 
-from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, count, share
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, count, share
 from spoofgym.console import console, show
 from spoofgym.envs.payoffs import Beyond, make_payoff
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL
@@ -47,6 +47,7 @@ def parser() -> argparse.ArgumentParser:
     add("--clean", type=share, default=0.5, help="share of games without an attack (default: %(default)s)")
     add("--games", type=count, default=300, help="of each pull (default: %(default)s)")
     add_seed(result, "the random numbers", 0)
+    add_import(result)
     add_json(result)
     return result
 

@@ -22,7 +22,7 @@ from typing import Any
 
 import spoofgym
 from spoofgym import files
-from spoofgym.command_line import Parser, add_seed, count
+from spoofgym.command_line import Parser, add_import, add_seed, count
 from spoofgym.console import console
 from spoofgym.evaluation.agent_scores import GAMES, SEED, agent_scores
 from spoofgym.policies.card import CARD_FILE, Card, layout_digest
@@ -63,6 +63,7 @@ def parser() -> argparse.ArgumentParser:
     add("--games", type=count, default=GAMES, help="for the scores of the card (default: %(default)s)")
     add_seed(result, "game 0", SEED)
     add("--onnx", action="store_true", help="write policy.onnx, too (extra onnx)")
+    add_import(result)
     return result
 
 

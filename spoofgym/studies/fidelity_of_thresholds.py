@@ -17,7 +17,7 @@ from typing import Any
 from spoofgym.calibration import calibrated_all
 from spoofgym.calibration.clean_statistics import joint_statistics
 from spoofgym.calibration.thresholds import Calibration, measure_together
-from spoofgym.command_line import STDOUT, Parser, above_one, add_json, add_seed, count, threads
+from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json, add_seed, count, threads
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector, require_threshold
 from spoofgym.evaluation.report import SCHEMA_VERSION
@@ -114,6 +114,7 @@ def parser() -> argparse.ArgumentParser:
     add("--epochs", type=count, default=1_000_000, help="clean ones of each fidelity (default: %(default)s)")
     add_seed(result, "the clean runs", 7)
     add("--threads", type=threads, default=1, help="that simulate (default: %(default)s)")
+    add_import(result)
     add_json(result)
     return result
 

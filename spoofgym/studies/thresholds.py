@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, above_one, add_json
+from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.report import SCHEMA_VERSION
@@ -84,6 +84,7 @@ def parser() -> argparse.ArgumentParser:
     add("--scenario", default="liu-flight", help="in which they hold (default: %(default)s)")
     add("--detector", action="append", help="repeatable (default: every family that fits the scenario)")
     add("--arl0", type=above_one, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
+    add_import(result)
     add_json(result)
     return result
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from rich.table import Table
 
-from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, add_threads, count
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, add_threads, count
 from spoofgym.console import console, show
 from spoofgym.evaluation.tuning import tuning_report
 from spoofgym.program import do_all, give_json, moved, program
@@ -38,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     add("--episodes", type=count, default=4000, help="games of each defender (default: %(default)s)")
     add_seed(result, "game 0", SEED)
     add_threads(result)
+    add_import(result)
     add_json(result)
     return result
 

@@ -13,7 +13,7 @@ from typing import Any
 from rich.table import Table
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, add_threads, count
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, add_threads, count
 from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.attackers import Evaluation
@@ -81,6 +81,7 @@ def parser() -> argparse.ArgumentParser:
     add("--episodes", type=count, default=4000, help="games of each row (default: %(default)s)")
     add_seed(result, "game 0")
     add_threads(result)
+    add_import(result)
     add_json(result)
     return result
 

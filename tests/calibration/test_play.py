@@ -49,7 +49,7 @@ def test_games_evaluation_and_training_have_the_same_thresholds(fidelity, monkey
         assert {name: detector.threshold for name, detector in game.simulation.detectors.items()} == expected
     monkeypatch.setattr(defenders, "WORLD_DETECTORS", ())
     listed = [ClassicalDefender("named", text, "exclude") for text in DETECTORS]
-    evaluated = defenders.world_of(scenario, "training", fidelity, 1, [], listed)
+    evaluated = defenders.world_of(scenario, "training", fidelity, 1, (), [], listed)
     compared = Matrix(scenario, fidelity, 100.0, 2, 0, 1)._detectors(DETECTORS)
     for detectors in (trained.detectors, evaluated.detectors, compared):
         assert {detector.name: detector.threshold for detector in detectors} == expected

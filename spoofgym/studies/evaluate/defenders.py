@@ -14,11 +14,18 @@ from typing import Any
 
 from rich.console import Console
 
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, add_threads, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
 from spoofgym.console import console
-from spoofgym.evaluation.defenders import POPULATIONS, check_names, evaluate_defenders, left_out
+from spoofgym.evaluation.defenders import (
+    NOBODY,
+    POPULATIONS,
+    check_names,
+    evaluate_defenders,
+    everybody,
+    left_out,
+)
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.policies.classical import parse, watcher_and_response
+from spoofgym.policies.classical import own_defenders, parse, watcher_and_response
 from spoofgym.policies.learned import LearnedDefender
 from spoofgym.policies.published import policy_folder
 from spoofgym.program import program
@@ -30,6 +37,7 @@ from spoofgym.studies.notes import tell_what_is_new
 EXAMPLES = (
     "spoofgym evaluate defenders --scenario foi-drive --defender runs/d",
     "spoofgym evaluate defenders --defender snapshot/exclude --episodes 500",
+    "spoofgym evaluate defenders --defender snapshot/exclude --only --attack ramp:1",
 )
 EPISODES = 4_000
 
@@ -45,11 +53,17 @@ def parser() -> argparse.ArgumentParser:
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
     add("--defender", action="append", default=[], metavar="POLICY|SPEC",
         help="run folder or name of a trained defender, or detector/response; repeatable")
-    add("--population", action="append", choices=tuple(POPULATIONS), help="of attacks; repeatable (default: all)")
+    add("--only", action="store_true", help="nobody plays beside the defenders that are named")
+    against = result.add_mutually_exclusive_group()
+    against.add_argument("--attack", metavar="SPEC", help="one attack, in place of the populations")
+    against.add_argument(
+        "--population", action="append", choices=tuple(POPULATIONS), help="of attacks; repeatable (default: all)"
+    )
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
     add("--episodes", type=count, default=EPISODES, help="games of each defender (default: %(default)s)")
     add_seed(result, "game 0")
     add_threads(result)
+    add_import(result)
     add_json(result)
     add_figure(result)
     return result
@@ -81,12 +95,15 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
             message = f"--defender {text!r} is neither a run folder nor detector/response: {error}"
             raise ValueError(message) from error
         policies.append(LearnedDefender.load(folder))
-    populations = options.population or tuple(POPULATIONS)
+    populations = [options.attack] if options.attack else options.population or tuple(POPULATIONS)
+    if options.only and not options.defender:
+        raise ValueError("--only leaves everybody out but the defenders that --defender names: name one")
     check_names(policies)
     tell_what_is_new(policies, scenario, fidelity)
-    for line in left_out(scenario):
-        terminal.print(line, markup=False, soft_wrap=True)
-    return evaluate_defenders(
-        scenario, fidelity, policies, given, populations, options.episodes, options.seed, options.threads,
-        terminal.status,
-    )
+    if not options.only:
+        given += [each for each in own_defenders() if each not in given]
+        for line in left_out(scenario):
+            terminal.print(line, markup=False, soft_wrap=True)
+    company = NOBODY if options.only else everybody(scenario)
+    games = (options.episodes, options.seed, options.threads)
+    return evaluate_defenders(scenario, fidelity, policies, given, populations, company, *games, terminal.status)

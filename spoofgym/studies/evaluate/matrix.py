@@ -17,6 +17,7 @@ from spoofgym.command_line import (
     Parser,
     above_one,
     add_figure,
+    add_import,
     add_json,
     add_seed,
     add_threads,
@@ -66,6 +67,7 @@ def parser() -> argparse.ArgumentParser:
     add("--episodes", type=count, help="games of each attack (default: 4000 linear, 500 strapdown)")
     add_seed(result, "game 0")
     add_threads(result)
+    add_import(result)
     add_json(result)
     add_figure(result)
     return result

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_json
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
@@ -40,6 +40,7 @@ def parser() -> argparse.ArgumentParser:
     add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
     add("--attack", action="append", metavar="SPEC",
         help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: ramp:0.5)")
+    add_import(result)
     add_json(result)
     return result
 

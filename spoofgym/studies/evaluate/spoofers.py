@@ -15,8 +15,9 @@ from typing import Any
 
 from rich.console import Console
 
+from spoofgym.attacks import ATTACKS
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, add_threads, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
@@ -26,6 +27,7 @@ from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
+from spoofgym.specification import registered_by_others
 from spoofgym.studies.evaluate.giving import give, spoofers
 from spoofgym.studies.notes import tell_what_is_new
 from spoofgym.studies.presentation import attackers_figure, attackers_table
@@ -54,11 +56,12 @@ def parser() -> argparse.ArgumentParser:
     add("--shadow", metavar="SPEC",
         help="scenario whose filter every attacker takes for the victim's, in place of the one it was trained with")
     add("--attack", action="append", default=[], metavar="SPEC",
-        help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable")
+        help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: your own, where --import registers any)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
     add("--episodes", type=count, help="games of each player (default: 20000 linear, 1000 strapdown)")
     add_seed(result, "game 0")
     add_threads(result)
+    add_import(result)
     add_json(result)
     add_figure(result)
     return result
@@ -94,7 +97,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
         options.threads,
         exact_threshold(scenario, detectors),
     )
-    attacks = [make_spoofer(text) for text in options.attack]
+    attacks = [make_spoofer(text) for text in options.attack or registered_by_others(ATTACKS)]
     evaluation.check_layouts(policies)
     evaluation.check_attacks(attacks)
     tell_what_is_new(policies, scenario, fidelity, detectors)
