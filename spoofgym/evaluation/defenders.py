@@ -318,8 +318,8 @@ def evaluate_defenders(
         progress: shows what is played.
 
     Raises:
-        ValueError: nobody plays, a given defender that is unknown, two policies of one name, one that was trained on another
-            observation, or one or a given defender whose detector does not fit the scenario.
+        ValueError: nobody plays, a given defender that is unknown, two policies of one name, one that was trained on
+            another observation, or one or a given defender whose detector does not fit the scenario.
     """
     check_names(policies)
     for defender in given:
