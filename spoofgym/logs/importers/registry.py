@@ -1,0 +1,62 @@
+"""Which importers there are, and which one a source is for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from spoofgym.logs.importers import dataflash, px4_ulog
+from spoofgym.logs.importers.recording import Options, Recording
+
+
+@dataclass(frozen=True)
+class Importer:
+    """One kind of source.
+
+    Attributes:
+        told: what it is, for people.
+        recognises: whether a path that exists is one.
+        read: reads it.
+    """
+
+    told: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path, Options], Recording]
+
+
+FILES: dict[str, Importer] = {
+    "ulog": Importer("PX4 ULog (.ulg)", px4_ulog.recognises, px4_ulog.read),
+    "dataflash": Importer("ArduPilot DataFlash (.bin, .log)", dataflash.recognises, dataflash.read),
+}
+"""Sources that are a file."""
+FOLDERS: dict[str, Importer] = {}
+"""Sources that are a folder."""
+IMPORTERS = FILES | FOLDERS
+
+
+def importer_of(source: Path) -> str:
+    """The name of the importer that a source is for.
+
+    Raises:
+        ValueError: it does not exist, or none knows it.
+    """
+    if not source.exists():
+        raise ValueError(f"{source}: no such file or folder")
+    candidates = FOLDERS if source.is_dir() else FILES
+    for name, importer in candidates.items():
+        if importer.recognises(source):
+            return name
+    known = "; ".join(f"{name}: {importer.told}" for name, importer in IMPORTERS.items())
+    raise ValueError(f"{source}: no format is recognised; known are {known}; --format names one")
+
+
+def read_source(source: Path, name: str | None, options: Options) -> Recording:
+    """Read a source by the importer of this name, or by the one that recognises it.
+
+    Raises:
+        ValueError: an unknown name, or what the importer refuses.
+    """
+    if name is None:
+        name = importer_of(source)
+    return IMPORTERS[name].read(source, options)
