@@ -64,6 +64,9 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("thresholds", "thresholds at an equal false-alarm rate", f"{STUDIES}.thresholds"),
         Command("tune", "the best classical defenders of a scenario", f"{STUDIES}.tune"),
     ),
+    "recorded logs": (
+        Command("import", "make a log folder of what others have recorded", f"{STUDIES}.import_log"),
+    ),
     "learn": (
         Command("train spoofer", "train a PPO spoofer", f"{LEARNING}.spoofer"),
         Command("train defender", "train a PPO defender", f"{LEARNING}.defender"),

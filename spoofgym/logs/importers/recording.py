@@ -39,12 +39,10 @@ class Options:
     Attributes:
         imu_topic: of a ROS bag; None = the only one there is.
         fix_topic: of a ROS bag; None = the only one there is.
-        mapping: TOML file that says what the columns of CSV files are; None = none.
     """
 
     imu_topic: str | None = None
     fix_topic: str | None = None
-    mapping: Path | None = None
 
 
 @dataclass(kw_only=True)

@@ -6,7 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from spoofgym.logs.importers import dataflash, px4_ulog
+from spoofgym.logs.importers import (
+    comma2k19,
+    dataflash,
+    gnsslogger,
+    kitti,
+    mapped_csv,
+    px4_ulog,
+    ros_bag,
+    ubx,
+)
 from spoofgym.logs.importers.recording import Options, Recording
 
 
@@ -28,9 +37,18 @@ class Importer:
 FILES: dict[str, Importer] = {
     "ulog": Importer("PX4 ULog (.ulg)", px4_ulog.recognises, px4_ulog.read),
     "dataflash": Importer("ArduPilot DataFlash (.bin, .log)", dataflash.recognises, dataflash.read),
+    "gnsslogger": Importer("Android GNSSLogger (.txt)", gnsslogger.recognises, gnsslogger.read),
+    "ros": Importer("ROS 1 bag, or ROS 2 bag (a folder)", ros_bag.recognises, ros_bag.read),
+    "ubx": Importer("u-blox UBX beside an imu.csv", ubx.recognises, ubx.read),
+    "csv": Importer("CSV files by a mapping (.toml)", mapped_csv.recognises, mapped_csv.read),
 }
 """Sources that are a file."""
-FOLDERS: dict[str, Importer] = {}
+FOLDERS: dict[str, Importer] = {
+    "comma2k19": Importer("comma2k19 segment", comma2k19.recognises, comma2k19.read),
+    "kitti": Importer("KITTI drive with oxts", kitti.recognises, kitti.read),
+    "ros": FILES["ros"],
+    "ubx": FILES["ubx"],
+}
 """Sources that are a folder."""
 IMPORTERS = FILES | FOLDERS
 
