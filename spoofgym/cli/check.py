@@ -39,7 +39,9 @@ OPTIONAL = {
     "pettingzoo": "multiagent",
     "onnx": "onnx",
     "ray": "ray",
-    "pyrtklib": "rinex",
+    "pyrtklib": "logs",
+    "pyulog": "logs",
+    "rosbags": "logs",
     "argcomplete": "completion",
 }
 """By the extra that installs each."""
