@@ -204,6 +204,23 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def games_output(text: str) -> Path:
+    """A file that can be written, whose name ends in ``.npz``."""
+    if not text.lower().endswith(".npz"):
+        raise argparse.ArgumentTypeError(f"a file of games ends in .npz, got {text!r}")
+    return output(text)
+
+
+def add_games(parser: argparse.ArgumentParser) -> None:
+    """The option ``--games`` of a program that plays many."""
+    parser.add_argument(
+        "--games",
+        type=games_output,
+        metavar="FILE.npz",
+        help="write what came of every single game: NumPy arrays (players, games)",
+    )
+
+
 def add_figure(parser: argparse.ArgumentParser) -> None:
     """The option ``--figure`` of a program that draws."""
     parser.add_argument(

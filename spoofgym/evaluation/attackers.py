@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.trained import spoofer_config
-from spoofgym.evaluation.metrics import attacker_score, undetected_error
+from spoofgym.evaluation.aggregate import aggregate, aggregate_row, of_one_setting
+from spoofgym.evaluation.game_log import GameLog
+from spoofgym.evaluation.metrics import AttackerScore, attacker_score, undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes, watch_attack
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import attacker_row
@@ -37,6 +40,7 @@ class Evaluation:
         seed: of game 0.
         threads: of the simulation.
         threshold: of the snapshot test where exact values exist, else None.
+        log: keeps what came of every game.
     """
 
     scenario: Scenario
@@ -47,6 +51,7 @@ class Evaluation:
     seed: int
     threads: int
     threshold: float | None
+    log: GameLog = field(default_factory=lambda: GameLog(0))
 
     def rows(
         self, policies: list[LearnedSpoofer], attacks: list[Attack], progress: Progress = silent
@@ -66,7 +71,7 @@ class Evaluation:
         for policy in policies:
             player = PolicySpoofer(policy)
             with progress(player.name):
-                score, exact = attacker_score(self.play(player, self.episodes)), self.exact(policy)
+                score, exact = self._score(player), self.exact(policy)
             rows.append(attacker_row(player.name, player.knowledge, score, exact, optimum))
         return rows
 
@@ -96,8 +101,28 @@ class Evaluation:
         score = None
         if baseline.attack is not None:
             with progress(baseline.name):
-                score = attacker_score(self.play(baseline.attack, self.episodes))
+                score = self._score(baseline.attack, baseline.name)
         return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
+
+    def _score(self, attack: Attack, name: str = "") -> AttackerScore:
+        """The figures of an attack, whose games are kept under a name: its own where none is given."""
+        games = self.play(attack, self.episodes)
+        self.log.note(
+            name or attack.name,
+            undetected_error_m=undetected_error(games),
+            final_error_m=games.final_error,
+            alarm_epoch=games.alarm_epoch,
+        )
+        return attacker_score(games)
+
+    def aggregates(self, policies: Sequence[LearnedSpoofer]) -> list[dict[str, Any]]:
+        """A row for the policies of each setting of which there are several, when their games have been played."""
+        players = {policy.name: PolicySpoofer(policy).name for policy in policies}
+        found = []
+        for names in of_one_setting(policies):
+            errors = np.stack([self.log.of(players[name], "undetected_error_m") for name in names])
+            found.append(aggregate_row(names, aggregate(errors)))
+        return found
 
     def _mean_score(self, attack: Attack, episodes: int) -> float:
         """Mean undetected error of an attack, m."""

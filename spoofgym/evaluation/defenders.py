@@ -25,7 +25,17 @@ from spoofgym.evaluation.defence import (
     play_random,
     play_response,
 )
-from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, difference, paired_difference
+from spoofgym.evaluation.defender_rows import (
+    ORACLE_DEPTH,
+    Played,
+    aggregates,
+    attacks_of,
+    comparisons,
+    gaps_of,
+    per_game,
+    rows,
+)
+from spoofgym.evaluation.game_log import GameLog
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import defenders_report
 from spoofgym.policies.classical import PUBLISHED, WORLD_DETECTORS, ClassicalDefender, tuned_for, with_depth
@@ -34,9 +44,6 @@ from spoofgym.scenario import Scenario
 
 POPULATIONS = {"training": False, "held-out": True}
 """Populations of attacks, and whether a defender never sees them in training."""
-ORACLE_DEPTH = "oracle-depth"
-LEARNED_MEAN = "mean of the learned"
-"""Stands for all learned defenders of a comparison: their mean error in each game."""
 
 
 YARDSTICKS = ("never", "always", "random", "oracle-onset", ORACLE_DEPTH)
@@ -155,21 +162,6 @@ def check_policies(world: World, policies: Sequence[LearnedDefender]) -> None:
             )
 
 
-@dataclass(frozen=True)
-class Played:
-    """A defender and what came of its games.
-
-    Attributes:
-        name: of the defender.
-        kind: "learned", "tuned", "published", "yardstick" or "given".
-        episodes: its games.
-    """
-
-    name: str
-    kind: str
-    episodes: DefenceEpisodes
-
-
 class Defenders:
     """Plays every defender in a world."""
 
@@ -231,66 +223,6 @@ def _better(one: DefenceEpisodes, other: DefenceEpisodes) -> DefenceEpisodes:
     )
 
 
-def rows(played: Played, held_out: bool, pooled: str) -> list[dict[str, Any]]:
-    """The rows of one defender: each attack by itself, games without one, and all games, which ``pooled`` names."""
-    episodes = played.episodes
-    parts = [(pooled, np.ones(len(episodes.member), dtype=bool)), ("none", episodes.member < 0)]
-    parts += [(name, episodes.member == place) for place, name in enumerate(episodes.names)]
-    return [
-        _row(played.name, attack, held_out, defender_score(episodes.of(games)))
-        for attack, games in parts
-        if games.any()
-    ]
-
-
-def _row(defender: str, attack: str, held_out: bool, score: DefenderScore) -> dict[str, Any]:
-    return {
-        "defender": defender,
-        "attack": attack,
-        "held_out": held_out,
-        "episodes": score.episodes,
-        "mean_error_m": score.mean_error,
-        "ci95_m": list(score.interval),
-        "rmse_m": score.rmse,
-        "max_error_m": score.max_error,
-        "detection_probability": score.detection_probability,
-        "median_time_to_detect_s": score.median_time_to_detect,
-        "error_at_detection_m": score.error_at_detection,
-        "median_time_to_reuse_s": score.median_time_to_reuse,
-        "never_reused_fraction": score.never_reused,
-        "clean_exclusion_fraction": score.clean_exclusion,
-        "false_alarms_per_epoch": score.false_alarms,
-    }
-
-
-def comparisons(learned: Sequence[Played], others: Sequence[Played], held_out: bool) -> list[dict[str, Any]]:
-    """Mean error of each learned defender, and of all of them averaged, minus that of every other on the same games."""
-    result = []
-    for other in others:
-        mean = np.mean([one.episodes.error.mean(axis=1) for one in learned], axis=0)
-        pairs = [(one.name, paired_difference(one.episodes, other.episodes)) for one in learned]
-        if len(learned) > 1:
-            pairs.append((LEARNED_MEAN, difference(mean, other.episodes.error.mean(axis=1))))
-        for name, found in pairs:
-            result.append(
-                {
-                    "defender": name,
-                    "baseline": other.name,
-                    "kind": other.kind,
-                    "held_out": held_out,
-                    "difference_m": found.mean,
-                    "ci95_m": list(found.interval),
-                }
-            )
-    return result
-
-
-def closed_gap(learned: float, best_classical: float, oracle: float) -> float | None:
-    """Share of the gap from the best tuned defender to `oracle-depth` that a defender closes; None if there is none."""
-    gap = best_classical - oracle
-    return (best_classical - learned) / gap if gap > 0 else None
-
-
 def evaluate_defenders(
     scenario: Scenario,
     fidelity: str,
@@ -302,6 +234,7 @@ def evaluate_defenders(
     seed: int,
     threads: int,
     progress: Progress = silent,
+    log: GameLog | None = None,
 ) -> dict[str, Any]:
     """The ``"defenders"`` report: every defender against every population.
 
@@ -316,6 +249,7 @@ def evaluate_defenders(
         seed: of game 0.
         threads: of the simulation.
         progress: shows what is played.
+        log: keeps what came of every game; None = of no further use.
 
     Raises:
         ValueError: nobody plays, a given defender that is unknown, two policies of one name, one that was trained on
@@ -330,7 +264,7 @@ def evaluate_defenders(
     if company == NOBODY and not given and not policies:
         raise ValueError("there is no defender to evaluate: name one")
     kinds: dict[str, str] = {}
-    report_rows, pairs, gaps = [], [], []
+    report_rows, pairs, gaps, together = [], [], [], []
     for population in populations:
         held_out = POPULATIONS.get(population, False)
         pooled = f"all-{population}" if population in POPULATIONS else "all-games"
@@ -343,28 +277,12 @@ def evaluate_defenders(
         for item in played:
             kinds[item.name] = item.kind
             report_rows += rows(item, held_out, pooled)
+            if log is not None:
+                log.note(item.name, population, mean_error_m=per_game(item), attack=attacks_of(item))
+        together += aggregates(policies, learned, population)
         if learned:
             pairs += comparisons(learned, [item for item in played if item.kind != "learned"], held_out)
-        gaps += _gaps(played, held_out)
+        gaps += gaps_of(played, held_out)
     report = defenders_report(scenario, fidelity, kinds, report_rows, pairs, gaps)
-    return report if set(populations) <= set(POPULATIONS) else {**report, "attack": populations[0]}
-
-
-def _gaps(played: Sequence[Played], held_out: bool) -> list[dict[str, Any]]:
-    """Shares of the gap between the best tuned defender of a fixed depth and `oracle-depth`."""
-    means = {item.name: float(item.episodes.error.mean()) for item in played}
-    tuned = [item.name for item in played if item.kind == "tuned"]
-    if not tuned or ORACLE_DEPTH not in means:
-        return []
-    best = tuned[0]
-    compared = [item.name for item in played if item.kind in ("learned", "given")] + tuned[1:]
-    return [
-        {
-            "defender": name,
-            "held_out": held_out,
-            "from": best,
-            "to": ORACLE_DEPTH,
-            "closed": closed_gap(means[name], means[best], means[ORACLE_DEPTH]),
-        }
-        for name in compared
-    ]
+    one = {} if set(populations) <= set(POPULATIONS) else {"attack": populations[0]}
+    return {**report, **one, "aggregates": together}

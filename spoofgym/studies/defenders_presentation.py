@@ -10,9 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from spoofgym import files
-from spoofgym.evaluation.defenders import LEARNED_MEAN
+from spoofgym.evaluation.defender_rows import LEARNED_MEAN
 from spoofgym.figures import new_figure
-from spoofgym.studies.presentation import number, plain
+from spoofgym.studies.presentation import aggregates_tables, number, plain
 
 COLOURS = {
     "learned": "#0072b2",
@@ -68,6 +68,8 @@ def defenders_tables(report: dict[str, Any]) -> Group:
         parts += [_comparisons(report, learned), ""]
     if report["gaps"]:
         parts += [_gaps(report)]
+    for table in aggregates_tables(report):
+        parts += ["", table]
     return Group(*parts)
 
 

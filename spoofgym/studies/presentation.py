@@ -58,6 +58,36 @@ def attackers_table(report: dict[str, Any]) -> Table:
     return table
 
 
+def aggregates_tables(report: dict[str, Any]) -> list[Table]:
+    """The several runs of one setting in a report, taken together; none where there are none."""
+    if not report["aggregates"]:
+        return []
+    table = Table(
+        title="runs of one setting together: mean error, m",
+        caption="IQM: of the means of the runs, without the lowest and the highest quarter; 95 % intervals by a "
+        "bootstrap over runs and games",
+        box=None,
+        padding=(0, 2, 0, 0),
+    )
+    table.add_column("runs", overflow="fold")
+    for title in ("mean", "95 %", "IQM", "95 %"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in report["aggregates"]:
+        where = f"{row['population']}: " if "population" in row else ""
+        table.add_row(
+            f"{where}{len(row['runs'])}: {', '.join(row['runs'])}",
+            f"{row['mean_m']:.3f}",
+            _range(row["ci95_m"]),
+            f"{row['iqm_m']:.3f}",
+            _range(row["iqm_ci95_m"]),
+        )
+    return [table]
+
+
+def _range(interval: list[float]) -> str:
+    return f"[{interval[0]:.3f}, {interval[1]:.3f}]"
+
+
 def recorded_table(report: dict[str, Any]) -> Table:
     """A ``"recorded"`` report for the terminal."""
     table = Table(

@@ -15,6 +15,7 @@ from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation import defenders
 from spoofgym.evaluation.defence import World, play_response
+from spoofgym.evaluation.defender_rows import closed_gap
 from spoofgym.policies import classical as listed
 from spoofgym.policies.learned import LearnedDefender
 from spoofgym.responses import make_response
@@ -192,8 +193,8 @@ def test_oracle_depth_is_the_best_depth_of_each_game():
 
 @pytest.mark.parametrize(("learned", "share"), [(1.0, 0.0), (0.8, 0.5), (0.6, 1.0), (1.2, -0.5)])
 def test_closed_gap(learned, share):
-    assert defenders.closed_gap(learned, 1.0, 0.6) == pytest.approx(share)
-    assert defenders.closed_gap(learned, 0.6, 0.6) is None
+    assert closed_gap(learned, 1.0, 0.6) == pytest.approx(share)
+    assert closed_gap(learned, 0.6, 0.6) is None
 
 
 @pytest.mark.usefixtures("world")

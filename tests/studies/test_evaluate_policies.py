@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from spoofgym.evaluation import defenders
@@ -83,3 +84,51 @@ def test_a_policy_attacks_a_recorded_log_that_shows_what_it_was_trained_to_see(t
     assert pulled["max_error_m"] > clean["max_error_m"]
     assert evaluate_recorded.main([log, "--attack", seeing]) == 2
     assert "cannot play on scenario" in capsys.readouterr().err
+
+
+def test_seeds_of_one_training_are_taken_together_and_every_game_is_written(tmp_path, capsys):
+    for name in ("s0", "s1"):
+        spoofer({"scenario": FLIGHT, "knowledge": "shadow"}, tmp_path / name)
+    both = [part for name in ("s0", "s1") for part in ("--attacker", str(tmp_path / name))]
+    found = report(evaluate_spoofers, capsys, *both, "--games", str(tmp_path / "games.npz"))
+    rows = {row["attacker"]: row for row in found["rows"]}
+    (together,) = found["aggregates"]
+    assert together["runs"] == ["s0", "s1"]
+    assert together["mean_m"] == pytest.approx(np.mean([rows[n]["mean_undetected_error_m"] for n in ("s0", "s1")]))
+    with np.load(tmp_path / "games.npz") as games:
+        players = games["players"].tolist()
+        assert games["undetected_error_m"].shape == (len(players), 8)
+        for name in ("s0", "none", "optimum"):
+            mean = games["undetected_error_m"][players.index(name)].mean()
+            assert mean == pytest.approx(rows[name]["mean_undetected_error_m"])
+
+
+def test_one_defender_meets_one_attack_alone(capsys, tmp_path):
+    parts = ["--defender", "snapshot/exclude", "--only", "--attack", "ramp:2", "--games", str(tmp_path / "games.npz")]
+    found = report(evaluate_defenders, capsys, *parts)
+    assert found["kinds"] == {"snapshot > exclude": "given"}
+    assert {row["attack"] for row in found["rows"]} <= {"all-games", "none", "ramp:2"}
+    assert found["attack"] == "ramp:2"
+    with np.load(tmp_path / "games.npz") as games:
+        (pooled,) = [row for row in found["rows"] if row["attack"] == "all-games"]
+        assert games["ramp:2.mean_error_m"].mean() == pytest.approx(pooled["mean_error_m"])
+        assert set(games["ramp:2.attack"][0]) <= {"none", "ramp:2"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--only"], "--only leaves everybody out but the defenders that --defender names"),
+        (["--only", "--defender", "snapshot/exclude", "--attack", "rmap:1"], "unknown attack 'rmap': did you mean"),
+        (["--games", "x.csv"], "a file of games ends in .npz, got 'x.csv'"),
+        (["--attack", "ramp:1", "--population", "training"], "not allowed with argument --attack"),
+    ],
+)
+def test_what_does_not_fit_is_told_before_anything_is_played(arguments, words, capsys):
+    try:
+        status = evaluate_defenders.main(arguments)
+    except SystemExit as ended:
+        status = ended.code
+    assert status == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line

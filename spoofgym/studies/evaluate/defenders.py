@@ -14,7 +14,17 @@ from typing import Any
 
 from rich.console import Console
 
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
+from spoofgym.command_line import (
+    STDOUT,
+    Parser,
+    add_figure,
+    add_games,
+    add_import,
+    add_json,
+    add_seed,
+    add_threads,
+    count,
+)
 from spoofgym.console import console
 from spoofgym.evaluation.defenders import (
     NOBODY,
@@ -24,6 +34,7 @@ from spoofgym.evaluation.defenders import (
     everybody,
     left_out,
 )
+from spoofgym.evaluation.game_log import GameLog
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.classical import own_defenders, parse, watcher_and_response
 from spoofgym.policies.learned import LearnedDefender
@@ -31,7 +42,7 @@ from spoofgym.policies.published import policy_folder
 from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.defenders_presentation import defenders_figure, defenders_tables
-from spoofgym.studies.evaluate.giving import give
+from spoofgym.studies.evaluate.giving import Output, give
 from spoofgym.studies.notes import tell_what_is_new
 
 EXAMPLES = (
@@ -66,6 +77,7 @@ def parser() -> argparse.ArgumentParser:
     add_import(result)
     add_json(result)
     add_figure(result)
+    add_games(result)
     return result
 
 
@@ -74,13 +86,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = _report(options, terminal)
-    figures = [("figure", options.figure, partial(defenders_figure, report))]
-    give(report, defenders_tables(report), options.json, terminal, figures)
+    log = GameLog(options.seed)
+    report = _report(options, terminal, log)
+    outputs: list[Output] = [
+        ("figure", options.figure, partial(defenders_figure, report)),
+        ("games", options.games, log.write),
+    ]
+    give(report, defenders_tables(report), options.json, terminal, outputs)
     return 0
 
 
-def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
+def _report(options: argparse.Namespace, terminal: Console, log: GameLog) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     fidelity = options.fidelity or scenario.fidelities[0]
     scenario.check_fidelity(fidelity)
@@ -106,4 +122,4 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
             terminal.print(line, markup=False, soft_wrap=True)
     company = NOBODY if options.only else everybody(scenario)
     games = (options.episodes, options.seed, options.threads)
-    return evaluate_defenders(scenario, fidelity, policies, given, populations, company, *games, terminal.status)
+    return evaluate_defenders(scenario, fidelity, policies, given, populations, company, *games, terminal.status, log)

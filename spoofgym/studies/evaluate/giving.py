@@ -15,12 +15,12 @@ from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.published import policy_folder
 from spoofgym.program import do_all, give_json
 
-Figure = tuple[str, Path | None, Callable[[Path], object]]
-"""What it shows, the file that was asked for, and what draws it."""
+Output = tuple[str, Path | None, Callable[[Path], object]]
+"""What it shows, the file that was asked for, and what writes it."""
 
 
 def give(
-    report: dict[str, Any], table: RenderableType, json: str | Path | None, terminal: Console, figures: Sequence[Figure]
+    report: dict[str, Any], table: RenderableType, json: str | Path | None, terminal: Console, outputs: Sequence[Output]
 ) -> None:
     """Give a report: the table, then JSON and figures where they are asked for; if one fails, the others are given.
 
@@ -29,13 +29,13 @@ def give(
         table: for the terminal.
         json: file, ``-`` for stdout, or None.
         terminal: where the table and the names of the files go.
-        figures: that the program can draw.
+        outputs: other files that the program can write.
     """
-    asked = [(what, path, draw) for what, path, draw in figures if path is not None]
+    asked = [(what, path, write) for what, path, write in outputs if path is not None]
     do_all(
         lambda: show(terminal, table),
         lambda: give_json(report, json),
-        *(partial(draw, path) for _, path, draw in asked),
+        *(partial(write, path) for _, path, write in asked),
     )
     for what, path in (("rows", json), *((what, path) for what, path, _ in asked)):
         if path is not None and path != STDOUT:

@@ -13,24 +13,35 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, Group
 
 from spoofgym.attacks import ATTACKS
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
+from spoofgym.command_line import (
+    STDOUT,
+    Parser,
+    add_figure,
+    add_games,
+    add_import,
+    add_json,
+    add_seed,
+    add_threads,
+    count,
+)
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.attackers import Evaluation
+from spoofgym.evaluation.game_log import GameLog
 from spoofgym.evaluation.report import attackers_report
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.program import program
 from spoofgym.scenarios import make_scenario
 from spoofgym.specification import registered_by_others
-from spoofgym.studies.evaluate.giving import give, spoofers
+from spoofgym.studies.evaluate.giving import Output, give, spoofers
 from spoofgym.studies.notes import tell_what_is_new
-from spoofgym.studies.presentation import attackers_figure, attackers_table
+from spoofgym.studies.presentation import aggregates_tables, attackers_figure, attackers_table
 
 EXAMPLES = (
     "spoofgym evaluate spoofers --attack ramp:0.2 --episodes 2000",
@@ -64,6 +75,7 @@ def parser() -> argparse.ArgumentParser:
     add_import(result)
     add_json(result)
     add_figure(result)
+    add_games(result)
     return result
 
 
@@ -72,13 +84,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = _report(options, terminal)
-    figures = [("figure", options.figure, partial(attackers_figure, report))]
-    give(report, attackers_table(report), options.json, terminal, figures)
+    report, log = _report(options, terminal)
+    outputs: list[Output] = [
+        ("figure", options.figure, partial(attackers_figure, report)),
+        ("games", options.games, log.write),
+    ]
+    give(report, Group(attackers_table(report), *aggregates_tables(report)), options.json, terminal, outputs)
     return 0
 
 
-def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
+def _report(options: argparse.Namespace, terminal: Console) -> tuple[dict[str, Any], GameLog]:
     scenario = make_scenario(options.scenario)
     if not scenario.random:
         raise ValueError(f"{scenario.name} is a recorded log: spoofgym evaluate recorded FOLDER")
@@ -96,10 +111,12 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
         options.seed,
         options.threads,
         exact_threshold(scenario, detectors),
+        GameLog(options.seed),
     )
     attacks = [make_spoofer(text) for text in options.attack or registered_by_others(ATTACKS)]
     evaluation.check_layouts(policies)
     evaluation.check_attacks(attacks)
     tell_what_is_new(policies, scenario, fidelity, detectors)
     rows = evaluation.rows(policies, attacks, terminal.status)
-    return attackers_report(scenario, fidelity, detectors, rows)
+    report = attackers_report(scenario, fidelity, detectors, rows)
+    return {**report, "aggregates": evaluation.aggregates(policies)}, evaluation.log
