@@ -6,6 +6,7 @@ Epochs of a run hang together, runs do not: what is rare is counted by runs and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,10 @@ class Proportion:
         low, high = exact_interval(self.events, self.trials)
         return low, high
 
+    def content(self) -> dict[str, Any]:
+        """For a report."""
+        return {"events": self.events, "runs": self.trials, "share": self.share, "ci95": list(self.interval)}
+
 
 @dataclass(frozen=True)
 class Integrity:
@@ -71,6 +76,21 @@ class Integrity:
     availability_interval: tuple[float, float]
     diagram: StanfordDiagram
     alarmed: int
+
+    def content(self) -> dict[str, Any]:
+        """For a report."""
+        return {
+            "alert_limit_m": self.alert_limit,
+            "time_to_alert": self.time_to_alert,
+            "integrity_failure": self.failed.content(),
+            "misleading_information": self.misled.content(),
+            "hazardously_misleading_information": self.hazardously_misled.content(),
+            "continuity": None if self.continuous is None else self.continuous.content(),
+            "availability": self.availability,
+            "availability_ci95": list(self.availability_interval),
+            "epochs_in_alarm": self.alarmed,
+            "diagram": self.diagram.content(),
+        }
 
     def text(self) -> str:
         """A table, one figure a line."""

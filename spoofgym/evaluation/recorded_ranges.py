@@ -18,6 +18,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import Fixes, interpolate, read_log
 from spoofgym.logs.range_epochs import RangeEpochs
@@ -281,6 +282,7 @@ def side_by_side(path: str) -> dict[str, Any]:
     tight = logs["tight"]
     assert isinstance(tight, RecordedRanges)
     return {
+        "schema_version": SCHEMA_VERSION,
         "kind": "recorded-ranges",
         "log": path,
         "onsets_s": onsets.tolist(),

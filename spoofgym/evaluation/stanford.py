@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,17 @@ class StanfordDiagram:
     counts: Runs
     regions: Runs
     unavailable_misleading: int
+
+    def content(self) -> dict[str, Any]:
+        """For a report: cells with epochs as (error, level, epochs), the others left out."""
+        cells = zip(*np.nonzero(self.counts), strict=True)
+        return {
+            "alert_limit_m": self.alert_limit,
+            "edges_m": self.edges.tolist(),
+            "cells": [[int(error), int(level), int(self.counts[error, level])] for error, level in cells],
+            "regions": dict(zip(NAMES, self.regions.tolist(), strict=True)),
+            "unavailable_misleading": self.unavailable_misleading,
+        }
 
 
 def region(error: Floats, protection_level: Floats, alert_limit: float) -> Runs:

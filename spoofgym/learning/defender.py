@@ -29,7 +29,9 @@ from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.envs.duel_config import DuelDefenderConfig
 from spoofgym.evaluation.agent_scores import play_games
 from spoofgym.evaluation.defence import World, play_policy
+from spoofgym.evaluation.learning_curve import VALIDATION_FILE
 from spoofgym.learning import checkpoint
+from spoofgym.learning.curve import LearningCurve
 from spoofgym.learning.defender_ppo import AnyDefenderConfig, Settings, begin, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
@@ -46,7 +48,6 @@ EXAMPLES = (
 )
 
 DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "signed-mean:n=5", "signed-mean:n=10")
-VALIDATION_FILE = "validation.json"
 VALIDATION_SEED = 2_000_000_000
 """Of validation game 0: far from the seeds of training lanes and of evaluations."""
 
@@ -130,7 +131,10 @@ class Training:
         state = folder.state()
         if state is not None:
             self._read(state)
-        self._watch = Watch(run.steps, terminal, lambda present: f"mean return {mean_return(present):.1f}", self._keep)
+        curve = LearningCurve(folder.path, self.played)
+        self._watch = Watch(
+            run.steps, curve, terminal, lambda present: f"mean return {mean_return(present):.1f}", self._keep
+        )
 
     def train(self) -> bool:
         """Train to the end; whether Ctrl-C came before it."""

@@ -27,6 +27,7 @@ from spoofgym.envs.config import ACTIONS, SpooferConfig, configure
 from spoofgym.envs.duel_config import DuelSpooferConfig
 from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.learning import checkpoint
+from spoofgym.learning.curve import LearningCurve
 from spoofgym.learning.ppo import Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
@@ -134,7 +135,7 @@ class Training:
         if state is not None:
             self._place = self._read(state)
             self._learner = self._present()
-        self._watch = Watch(run.steps, terminal, self._told, self._keep)
+        self._watch = Watch(run.steps, LearningCurve(folder.path, self.played), terminal, self._told, self._keep)
 
     def _told(self, learner: PPO) -> str:
         """What the bar says of a learner."""

@@ -12,6 +12,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
+from spoofgym.learning.curve import LearningCurve
+
 CHECKPOINTS = 10
 LONGEST_LEG = 250_000
 
@@ -35,18 +37,24 @@ class Watch(BaseCallback):
     """
 
     def __init__(
-        self, steps: int, console: Console, result: Callable[[PPO], str], keep: Callable[[PPO], None]
+        self,
+        steps: int,
+        curve: LearningCurve,
+        console: Console,
+        result: Callable[[PPO], str],
+        keep: Callable[[PPO], None],
     ) -> None:
         """Watch a run of ``steps``.
 
         Args:
             steps: of all learners.
+            curve: of the run; written before every checkpoint.
             console: where the bar is shown, if it is a terminal.
             result: what the bar says of a learner.
             keep: called after every leg, between two rollouts.
         """
         super().__init__()
-        self._steps, self._result, self._keep = steps, result, keep
+        self._steps, self._curve, self._result, self._keep = steps, curve, result, keep
         self.steps_before = 0
         self.stream: tuple[int, ...] = (0, 0)
         self._progress = Progress(
@@ -78,11 +86,16 @@ class Watch(BaseCallback):
             self._end_of_leg = None
             learner.learn(steps - done, callback=self, reset_num_timesteps=done == 0, tb_log_name=name)
 
+    def _on_training_end(self) -> None:
+        self._curve.save()
+
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_end(self) -> None:
         played = self.steps_before + self.num_timesteps
+        if self.model.ep_info_buffer:
+            self._curve.note(self.stream[1], self.num_timesteps, played, mean_return(self.model))
         self._progress.update(
             self._task, completed=min(played, self._steps), result=self._result(self.model)  # type: ignore[arg-type]
         )
@@ -91,6 +104,7 @@ class Watch(BaseCallback):
         if self._end_of_leg is not None and self.num_timesteps < self._end_of_leg:
             return
         if self._end_of_leg is not None:
+            self._curve.save()
             self._keep(self.model)  # type: ignore[arg-type]
         begin_leg(self.model, self.stream)
         self._end_of_leg = self.num_timesteps + leg_of(self._steps)

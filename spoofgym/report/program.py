@@ -8,6 +8,7 @@ What it reads is JSON of the other programs and run folders; `spoofgym.report.so
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +17,10 @@ from spoofgym.command_line import Parser, output
 from spoofgym.program import program
 from spoofgym.report.page import write_page
 
+EXAMPLES = (
+    "spoofgym report evaluation.json matrix.json -o report.html",
+    "spoofgym report runs/seed0 runs/seed1 -o curves.html",
+)
 DEFAULT_PAGE = "report.html"
 EXAMPLES = (
     "spoofgym report evaluation.json matrix.json -o report.html",
@@ -23,7 +28,7 @@ EXAMPLES = (
 )
 
 
-def parser() -> Parser:
+def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
         prog="spoofgym report",

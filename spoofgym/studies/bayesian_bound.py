@@ -24,6 +24,7 @@ from spoofgym.evaluation.bayesian_bound import BoundSettings, bound_games, bound
 from spoofgym.evaluation.defenders import fits
 from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.evaluation.engine import make_engine
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.optimum.bayes import POPULATION_SHAPES, RESOLUTIONS
 from spoofgym.policies.classical import SEPARATOR, WORLD_DETECTORS, tuned_for
 from spoofgym.program import do_all, give_json, moved, program
@@ -79,6 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         games = bound_games(settings, options.out / "bayesian", engine, notify)
         rows.append(bound_report(settings, games, same_games(settings, defenders, options.out / "cells")))
     report = {
+        "schema_version": SCHEMA_VERSION,
         "kind": "bayesian-bound",
         "scenario": scenario.name,
         "clean": options.clean,

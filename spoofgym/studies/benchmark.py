@@ -31,6 +31,7 @@ from spoofgym.evaluation.benchmark_play import Matches
 from spoofgym.evaluation.benchmark_report import measure, references
 from spoofgym.evaluation.benchmark_v1 import V1
 from spoofgym.evaluation.engine import Engine, Notify, make_engine
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.program import FAILURE, do_all, give_json, moved, program
 from spoofgym.studies.benchmark_page import page_results, write_rows
 from spoofgym.studies.benchmark_presentation import (
@@ -106,7 +107,8 @@ def _references(
 ) -> int:
     found = references(matches, V1.chosen(options.track, asked), engine, notify)
     tasks = [asdict(each) for each in found]
-    report = {"kind": "references", "benchmark": V1.name, "digest": V1.digest, "track": options.track, "tasks": tasks}
+    pinned = {"benchmark": V1.name, "digest": V1.digest, "track": options.track}
+    report = {"schema_version": SCHEMA_VERSION, "kind": "references", **pinned, "tasks": tasks}
     _give([references_table(found, V1)], report, options.json)
     return 0 if all(agrees(each, V1) for each in found) else FAILURE
 

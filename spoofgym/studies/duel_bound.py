@@ -17,6 +17,7 @@ from rich.table import Table
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, count, share
 from spoofgym.console import console, show
 from spoofgym.envs.payoffs import Beyond, make_payoff
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.gaussian_spoofer import Loss, LowerBound, beyond_loss, error_loss, lower_bound
@@ -107,7 +108,7 @@ def bound_report(
         for payoff, bound in found.items()
     ]
     settings = {"scenario": scenario.name, "clean": clean, "games": games, "seed": seed}
-    return {"kind": "duel-bound", **settings, "rows": rows}
+    return {"schema_version": SCHEMA_VERSION, "kind": "duel-bound", **settings, "rows": rows}
 
 
 def bound_table(report: dict[str, Any]) -> Table:

@@ -13,19 +13,22 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import special
 
 from spoofgym.arrays import Flags, Floats
-from spoofgym.command_line import Parser, add_figure, add_seed, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, count
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.tight.shared_gains import TightNavigator
-from spoofgym.program import moved, program
+from spoofgym.program import give_json, moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
@@ -197,6 +200,7 @@ def parser() -> argparse.ArgumentParser:
     )
     result.add_argument("--runs", type=count, default=200, help="of each replica (default: %(default)s)")
     add_seed(result, "run 0")
+    add_json(result)
     add_figure(result)
     return result
 
@@ -205,18 +209,42 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    print(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")
-    print(
-        "| signals | level and alarm | level, m | misleading information | integrity failure | available | in alarm |"
-    )
-    print("|---|---|---|---|---|---|---|")
+    tell = partial(print, file=sys.stderr if options.json == STDOUT else sys.stdout, flush=True)
+    tell(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")
+    tell("| signals | level and alarm | level, m | misleading information | integrity failure | available | in alarm |")
+    tell("|---|---|---|---|---|---|---|")
+    rows = []
     for replica in REPLICAS:
         flight = play(replica, options.runs, options.seed, HORIZON)
         for user in USERS:
-            print(row(replica, user, flight.result(user), flight.level[user]), flush=True)
+            result, level = flight.result(user), flight.level[user]
+            tell(row(replica, user, result, level))
+            named = {"signals": replica.words, "user": user, "level_m": float(np.median(level))}
+            rows.append({**named, **result.content()})
         if replica == SLOW and options.figure is not None:
             draw(flight, replica, options.figure)
+    give_json(report(rows, options.runs, options.seed), options.json)
     return 0
+
+
+def report(rows: list[dict[str, Any]], runs: int, seed: int) -> dict[str, Any]:
+    """An ``"integrity"`` report.
+
+    Args:
+        rows: of all signals and users.
+        runs: of each replica.
+        seed: of run 0.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "integrity",
+        "scenario": "kujur-flight",
+        "direction": "vertical",
+        "epochs": HORIZON,
+        "runs": runs,
+        "seed": seed,
+        "rows": rows,
+    }
 
 
 if __name__ == "__main__":

@@ -7,7 +7,12 @@
   /** Groups in the order in which they come, with a colour and a mark each. */
   function groupsOf(figure) {
     const names = [...new Set(figure.bars.map((bar) => bar.group))];
-    return new Map(names.map((name, place) => [name, { colour: name === "baseline" ? page.colour("baseline") : page.seriesColour(place), shape: SHAPES[place % SHAPES.length] }]));
+    const coloured = names.filter((name) => name !== "baseline");
+    const look = (name) => ({
+      colour: name === "baseline" ? page.colour("baseline") : page.seriesColour(coloured.indexOf(name)),
+      shape: figure.logarithmic ? SHAPES[names.indexOf(name) % SHAPES.length] : "square",
+    });
+    return new Map(names.map((name) => [name, look(name)]));
   }
 
   function span(figure) {
@@ -32,7 +37,8 @@
     const width = page.width(node);
     const narrow = width < 640;
     const labels = narrow ? 0 : Math.min(Math.max(...figure.bars.map((bar) => reach(bar.label))) + 10, 0.38 * width);
-    const row = narrow ? 46 : 27;
+    const noted = figure.bars.some((bar) => bar.note);
+    const row = narrow ? (noted ? 60 : 46) : 27;
     const head = 18 * figure.marks.length + 6;
     const bottom = head + row * figure.bars.length;
     const values = narrow ? 8 : Math.min(Math.max(...figure.bars.map((bar) => reach(written(bar)))) + 14, 0.34 * width);
@@ -45,25 +51,31 @@
       drawing.append(page.svg("text", { x: scale(tick), y: bottom + 16, "text-anchor": "middle", class: "muted" }, page.number(tick)));
     }
     drawing.append(page.svg("text", { x: labels + 4, y: bottom + 36, class: "muted" }, figure.unit));
-    figure.bars.forEach((bar, place) => drawBar(drawing, figure, bar, { scale, groups, labels, narrow, width, middle: head + row * place + (narrow ? 32 : row / 2) }));
+    const marks = page.svg("g");
+    drawing.append(marks);
+    figure.bars.forEach((bar, place) => drawBar(drawing, figure, bar, { scale, groups, labels, narrow, width, middle: head + row * place + (narrow ? row - 14 : row / 2), noted }));
     figure.marks.forEach((mark, place) => {
       const x = scale(mark.value);
-      drawing.append(page.svg("line", { x1: x, x2: x, y1: head - 4, y2: bottom, stroke: page.colour("bound"), "stroke-width": 1.5, "stroke-dasharray": page.dashes[(place + 1) % 4].join(" ") }));
+      marks.append(page.svg("line", { x1: x, x2: x, y1: head - 4, y2: bottom, stroke: page.colour("bound"), "stroke-width": 1.5, "stroke-dasharray": page.dashes[(place + 1) % 4].join(" ") }));
       const text = `${mark.label} ${page.number(mark.value)}`;
       const end = x > width / 2;
-      drawing.append(page.svg("text", { x: x + (end ? -5 : 5), y: 14 + 18 * place, "text-anchor": end ? "end" : "start", style: `fill:${page.colour("bound")}` }, text));
-      drawing.append(page.svg("line", { x1: x, x2: x, y1: 4 + 18 * place, y2: head, stroke: page.colour("bound"), "stroke-width": 1 }));
+      marks.append(page.svg("text", { x: x + (end ? -5 : 5), y: 14 + 18 * place, "text-anchor": end ? "end" : "start", style: `fill:${page.colour("bound")}` }, text));
+      marks.append(page.svg("line", { x1: x, x2: x, y1: 4 + 18 * place, y2: head, stroke: page.colour("bound"), "stroke-width": 1 }));
     });
     const legend = [...groups].filter(([name]) => name).map(([name, { colour, shape }]) => ({ name, colour, shape }));
     node.replaceChildren(...(legend.length > 1 ? [page.legend(legend)] : []), drawing);
   }
 
-  function drawBar(drawing, figure, bar, { scale, groups, labels, narrow, width, middle }) {
+  function drawBar(drawing, figure, bar, { scale, groups, labels, narrow, width, middle, noted }) {
     const { colour, shape } = groups.get(bar.group);
     const [least] = span(figure);
-    const label = page.svg("text", narrow ? { x: 2, y: middle - 14 } : { x: labels - 4, y: middle + 4, "text-anchor": "end" }, cut(narrow ? `${bar.label}: ${written(bar)}` : bar.label, narrow ? width : labels));
+    const above = noted ? 28 : 14;
+    const named = narrow && !noted ? `${bar.label}: ${written(bar)}` : bar.label;
+    const place = narrow ? { x: 2, y: middle - above } : { x: labels - 4, y: middle + 4, "text-anchor": "end" };
+    const label = page.svg("text", place, cut(named, narrow ? width : labels));
     label.append(page.svg("title", {}, `${bar.label}: ${written(bar)}`));
     drawing.append(label);
+    if (narrow && noted) drawing.append(page.svg("text", { x: 2, y: middle - 14, class: "muted" }, cut(written(bar), width)));
     if (bar.value === null) {
       if (!narrow) drawing.append(page.svg("text", { x: labels + 8, y: middle + 4, class: "muted" }, bar.note || "–"));
       return;
@@ -79,7 +91,7 @@
       drawing.append(page.svg("path", { d, stroke: page.colour("ink"), "stroke-width": 1.5, fill: "none" }));
     }
     if (figure.logarithmic) drawing.append(page.mark(shape, x, middle, 4, colour));
-    if (!narrow) drawing.append(page.svg("text", { x: Math.max(x, bar.high === null ? x : scale(bar.high), zero) + 8, y: middle + 4 }, written(bar)));
+    if (!narrow) drawing.append(page.svg("text", { class: "halo", x: Math.max(x, bar.high === null ? x : scale(bar.high), zero) + 8, y: middle + 4 }, written(bar)));
   }
 
   /** A text that fits into so many pixels. */

@@ -51,10 +51,12 @@
 
     function draw() {
       const curves = shown();
-      const low = least(figure.curves.filter((curve) => curve.choice === choices[chosen]));
+      const chosenCurves = figure.curves.filter((curve) => curve.choice === choices[chosen]);
+      const low = least(chosenCurves);
+      const high = Math.min(Math.max(0.1, ...chosenCurves.flatMap((curve) => curve.x)), 0.999);
       const kinds = [
-        { title: "ROC: detection over false alarms", y: [0, 1], ordinate: (value) => value, label: "detection probability", make: page.linear, x: page.logarithmic, span: [low, 1] },
-        { title: "DET: misses over false alarms", y: [0.0005, 0.9995], ordinate: (value) => clamp(1 - value), label: "miss probability", make: page.deviate, x: page.deviate, span: [Math.max(low, 0.0001), 0.999] },
+        { title: "ROC: detection over false alarms", y: [0, 1], ordinate: (value) => value, label: "detection probability", make: page.linear, x: page.logarithmic, span: [low, high] },
+        { title: "DET: misses over false alarms", y: [0.0005, 0.9995], ordinate: (value) => clamp(1 - value), label: "miss probability", make: page.deviate, x: page.deviate, span: [Math.max(low, 0.0001), high] },
       ];
       kinds.forEach((kind, index) => {
         const width = page.width(sheets[index]);

@@ -22,15 +22,17 @@
     setTimeout(() => URL.revokeObjectURL(address), 1000);
   }
 
-  /** Buttons below a figure; the table is made when it is first opened. */
-  page.tools = (node, title, table) => {
+  /** Buttons below a figure; the table is made when it is first opened, and not where the figure is one. */
+  page.tools = (node, title, table, isTable) => {
     const name = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60) || "figure";
     const label = `Numbers of “${title}” as CSV`;
     const button = page.element("button", { type: "button", class: "csv", "aria-label": label, click: () => save({ name, ...table() }) }, "Numbers as CSV");
+    node.append(button);
+    if (isTable) return;
     const details = page.element("details", {}, page.element("summary", {}, "Numbers as a table"));
     details.addEventListener("toggle", () => {
       if (details.open && details.children.length === 1) details.append(page.sortedTable(table(), title));
     });
-    node.append(button, details);
+    node.append(details);
   };
 })();

@@ -2,10 +2,16 @@
 "use strict";
 
 (() => {
-  const INTENSE = 0.5; // from here on the text of a cell changes its colour
+  const MANY = 9; // columns whose names are written upwards
 
   function parts(name) {
     return page.colour(name).split(",").map(Number);
+  }
+
+  /** Relative luminance of a colour (WCAG 2). */
+  function luminance(rgb) {
+    const [r, g, b] = rgb.map((part) => (part / 255 <= 0.04045 ? part / 255 / 12.92 : ((part / 255 + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   }
 
   /** How strong the colour of a value is, from 0 to 1. */
@@ -23,8 +29,8 @@
   function style(share) {
     const [low, high] = [parts("heat-low"), parts("heat-high")];
     const mixed = low.map((part, place) => Math.round(part + share * (high[place] - part)));
-    const dark = document.documentElement.dataset.theme === "dark";
-    const ink = share > INTENSE ? (dark ? "#10141a" : "#ffffff") : page.colour("ink");
+    const light = luminance(mixed);
+    const ink = (light + 0.05) ** 2 > 1.05 * 0.05 ? "#000000" : "#ffffff"; // whichever has the larger contrast
     return `background:rgb(${mixed.join(",")});color:${ink}`;
   }
 
@@ -37,7 +43,7 @@
     let layer = figure.frames ? figure.layers.length - 1 : 0;
     let intervals = figure.layers.some((each) => each.low !== null) && figure.rows.length * figure.columns.length <= 80;
     let [byRow, byColumn] = [null, null]; // [place or "name" or "weight", descending]
-    const sheet = page.element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": figure.title });
+    const sheet = page.element("div", { class: "scroll whole", tabindex: 0, role: "region", "aria-label": figure.title });
     const controls = page.element("div", { class: "controls" });
 
     const weights = (side) => (figure[`${side}_weights`] === null ? null : figure[`${side}_weights`][layer]);
@@ -64,7 +70,7 @@
     const direction = (order, place) => (order !== null && order[0] === place ? (order[1] ? "descending" : "ascending") : null);
 
     function head(text, weight, order, place, click, scope) {
-      const button = page.element("button", { type: "button", title: "Sort by this", click }, text);
+      const button = page.element("button", { type: "button", title: `Sort by ${text}`, click }, ...page.folded(text));
       const share = weight === null || weight === undefined ? null : page.element("div", { class: "weight" }, `${figure.weighted} ${page.number(weight, 2)}`);
       return page.element("th", { scope, "aria-sort": direction(order, place) }, button, share);
     }
@@ -94,7 +100,7 @@
         page.element("tr", {},
           head(figure.rows[row], rowWeights && rowWeights[row], byRow, row, redraw(() => (byRow = toggled(byRow, row))), "row"),
           ...columns.map((column) => cell(shares, row, column))));
-      sheet.replaceChildren(page.element("table", { class: "heat" }, page.element("caption", {}, figure.layers[layer].name), page.element("thead", {}, page.element("tr", {}, corner, ...heads)), page.element("tbody", {}, ...body)));
+      sheet.replaceChildren(page.element("table", { class: columns.length > MANY ? "heat many" : "heat" }, page.element("caption", {}, figure.layers[layer].name), page.element("thead", {}, page.element("tr", {}, corner, ...heads)), page.element("tbody", {}, ...body)));
     }
 
     if (figure.layers.length > 1) {

@@ -17,6 +17,12 @@ window.page = {
     return node;
   },
 
+  /** A name that may be folded after its punctuation, and nowhere else. */
+  folded(name) {
+    const parts = String(name).split(/(?<=[:,/+>_-])/);
+    return parts.flatMap((part, place) => (place ? [page.element("wbr"), part] : [part]));
+  },
+
   /** The width of an element in whole pixels. */
   width(node) {
     return Math.max(240, Math.floor(node.getBoundingClientRect().width));

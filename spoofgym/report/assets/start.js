@@ -7,7 +7,7 @@
     const node = document.getElementById(`figure-${place}`);
     try {
       const table = page.figures[figure.type](node.querySelector(".drawing"), figure);
-      page.tools(node.querySelector(".tools"), figure.title, table);
+      page.tools(node.querySelector(".tools"), figure.title, table, figure.type === "table");
       node.dataset.drawn = "yes";
     } catch (error) {
       node.querySelector(".drawing").append(page.element("p", { class: "notice" }, `This figure could not be drawn: ${error.message}`));

@@ -252,6 +252,7 @@ class Reproduction:
         """The rows with plain types, and what made them."""
         return {
             "schema_version": SCHEMA_VERSION,
+            "kind": "reproduction",
             "paper": self.paper,
             "runs": self.runs,
             "seed": self.seed,

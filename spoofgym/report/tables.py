@@ -1,0 +1,76 @@
+"""Rows of a report as a table, whatever is in them; kinds of reports that have no figure of their own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from spoofgym.report.figures import Section, TableFigure
+
+Report = Mapping[str, Any]
+INTERVAL = "ci95"
+NAMES = {"arl0": "ARL₀, epochs", "episodes": "Games of each", "games": "Games of each"}
+UNTOLD = ("schema_version", "kind", "rows")
+
+
+def table_of(title: str, summary: str, rows: Sequence[Mapping[str, Any]]) -> TableFigure:
+    """A table of rows with the same keys; intervals become two columns, what is nested is written as JSON."""
+    flat = [_flat(row) for row in rows]
+    columns = list(dict.fromkeys(name for row in flat for name in row))
+    return TableFigure(
+        title=title, summary=summary, columns=columns, rows=[[row.get(name) for name in columns] for row in flat]
+    )
+
+
+def plain_section(report: Report) -> list[Section]:
+    """A report of rows as a table: what it has beside them is told above."""
+    rows = report["rows"]
+    what = str(report["kind"]).replace("-", " ")
+    about = report.get("paper") or report.get("scenario")
+    title = what[:1].upper() + what[1:] + (f": {about}" if about else "")
+    summary = f"{len(rows)} rows. A click on the name of a column sorts them."
+    return [Section(title, facts_of(report), [table_of(title, summary, rows)])]
+
+
+def facts_of(report: Report) -> list[tuple[str, str]]:
+    """What a report says beside its rows, as text: its plain values by their names."""
+    facts = []
+    for name, value in report.items():
+        if name in UNTOLD or not isinstance(value, str | int | float | bool):
+            continue
+        text = ("yes" if value else "no") if isinstance(value, bool) else _written(value)
+        facts.append((NAMES.get(name, name[:1].upper() + name[1:].replace("_", " ")), text))
+    detector = report.get("detector")
+    if isinstance(detector, Mapping):
+        threshold = "" if detector["threshold"] is None else f" above {detector['threshold']:.4g}"
+        facts.append(("Detector", f"{detector['name']}{threshold}"))
+    return facts
+
+
+def _written(value: str | int | float) -> str:
+    return f"{value:.10g}" if isinstance(value, int | float) else value
+
+
+def interval_of(row: Mapping[str, Any], name: str = "ci95") -> tuple[float | None, float | None]:
+    """The ends of an interval; None where there is none."""
+    low, high = row.get(name) or (None, None)
+    return low, high
+
+
+def percent(share: float | None) -> float | None:
+    """A share as percent."""
+    return None if share is None else 100.0 * share
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in row.items():
+        if INTERVAL in name and (value is None or (isinstance(value, list) and len(value) == 2)):
+            low, high = value or (None, None)
+            flat |= {f"{name} from": low, f"{name} to": high}
+        elif value is None or isinstance(value, str | int | float | bool):
+            flat[name] = value
+        else:
+            flat[name] = json.dumps(value, ensure_ascii=False)
+    return flat
