@@ -126,6 +126,14 @@ def share(text: str) -> float:
     return value
 
 
+def share_of_alarms(text: str) -> float:
+    """A probability between 0 and 1."""
+    value = share(text)
+    if value in (0.0, 1.0):
+        raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, got {text!r}")
+    return value
+
+
 def above_one(text: str) -> float:
     """A finite number greater than 1."""
     try:

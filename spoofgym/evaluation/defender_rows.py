@@ -112,6 +112,7 @@ def aggregates(policies: Sequence[LearnedDefender], learned: Sequence[Played], p
 
 
 def per_game(item: Played) -> Floats:
+    """Mean error of each game, (n,), m."""
     return np.asarray(item.episodes.error.mean(axis=1))
 
 

@@ -24,6 +24,8 @@ COLUMNS = 12
 """Attacks side by side on the terminal."""
 CELL = (0.40, 0.27)
 """Width and height of a cell of the heat maps, inches: three digits of 9 pt, which a page shows at 8 to 11 pixels."""
+LEAST_WIDTH = 5.0
+"""Of the heat maps, inches: room for the title."""
 CURVES_DRAWN = 6
 LEAST_ALARMS = 10
 """Clean games with an alarm that a point must stand on to be drawn: its share is then known within a factor of 2."""
@@ -52,12 +54,21 @@ def ensemble_notes(report: dict[str, Any]) -> list[str]:
     return notes
 
 
-def _without_arl0(name: str, arl0: float) -> str:
+def _without_arl0(name: str, arl0: float | None) -> str:
     """The shortest specification that means the same at this ARL₀."""
+    if arl0 is None:
+        return name
     name = name.replace(f":arl0={arl0:g},", ":").replace(f":arl0={arl0:g}/", ":")
     for mark in (f",arl0={arl0:g}", f":arl0={arl0:g}", f"/arl0={arl0:g}"):
         name = name.replace(mark, "")
     return name
+
+
+def common_rate(report: dict[str, Any]) -> str:
+    """The false-alarm rate that all detectors of a matrix have."""
+    if report["arl0"] is None:
+        return f"a false-alarm probability of {report['false_alarm_probability']:g} per epoch of clean games"
+    return f"ARL₀ {report['arl0']:g} epochs"
 
 
 def values(report: dict[str, Any], key: str) -> tuple[list[str], list[str], Floats]:
@@ -91,10 +102,11 @@ def matrix_tables(report: dict[str, Any]) -> Group:
     parts.append(Text("\n".join(ensemble_notes(report))))
     parts.append(
         Text(
-            f"{report['scenario']}, {report['fidelity']}, ARL₀ {report['arl0']:g} epochs, {report['episodes']} games "
+            f"{report['scenario']}, {report['fidelity']}, {common_rate(report)}, {report['episodes']} games "
             "of each attack; intervals, delays and errors at the alarm stand in the JSON."
         )
     )
+    parts += [Text(f"left out: {line}") for line in report.get("left_out", ())]
     return Group(*parts)
 
 
@@ -139,13 +151,14 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
     names = short_names(report)
     detectors, attacks, detected = values(report, "detection_probability")
     _, _, error = values(report, "mean_undetected_error_m")
-    width, height = 1.9 + CELL[0] * len(attacks), 2.4 + CELL[1] * len(detectors)
+    width = max(1.9 + CELL[0] * len(attacks), LEAST_WIDTH)
+    height = 2.4 + CELL[1] * len(detectors)
     figure = new_figure(width, 2 * height, dpi=150, layout="constrained")
     above, below = figure.subplots(2, 1)
     labels = [names[name] for name in detectors]
     _heat(above, labels, attacks, detected, 100.0 * detected, "Blues", 1.0)
     above.set_title(
-        f"{plain(report['scenario'])}: games with an alarm, %, at ARL₀ = {report['arl0']:g} epochs\n"
+        f"{plain(report['scenario'])}: games with an alarm, %, at {common_rate(report)}\n"
         "(none: clean games, false alarms)",
         loc="left",
         fontsize=11,

@@ -126,6 +126,39 @@ def recorded_table(report: dict[str, Any]) -> Table:
     return table
 
 
+def recorded_figure(report: dict[str, Any], path: Path) -> None:
+    """Bars of the largest error of each attack on a log, and the error at its alarm, beside that of the clean log."""
+    rows = [row for row in report["rows"] if row["max_error_m"] is not None]
+    if not rows:
+        raise ValueError("the log has no reference within the attacks: there is no error to draw")
+    figure = new_figure(8.0, 0.55 * len(rows) + 1.9, dpi=120, layout="constrained")
+    axes = figure.add_subplot()
+    most = max(row["max_error_m"] for row in rows)
+    for place, row in enumerate(reversed(rows)):
+        axes.barh(place, row["max_error_m"], color=LEARNED if row["detected"] else BASELINE, height=0.7)
+        label = "never detected"
+        if row["detected"]:
+            label = f"detected after {row['time_to_detect_s']:.1f} s"
+            if row["error_at_detection_m"] is not None:
+                label += f", at {row['error_at_detection_m']:.1f} m"
+                axes.plot(row["error_at_detection_m"], place, "|", color="black", markersize=16)
+        inside = row["max_error_m"] > 0.55 * most
+        axes.text(
+            row["max_error_m"] + (-0.01 if inside else 0.01) * most, place, label, va="center", fontsize=9,
+            ha="right" if inside else "left", color="white" if inside else "black",
+        )
+    clean = rows[0]["clean_error_p95_m"]
+    if clean is not None:
+        axes.axvline(clean, color=BOUND, linestyle="--", linewidth=1.2, label=f"95 % of the clean log, {clean:.2f} m")
+        axes.legend(loc="upper right", fontsize=8, frameon=False, bbox_to_anchor=(1.0, 1.12))
+    axes.set_yticks(range(len(rows)), [plain(row["attack"]) for row in reversed(rows)], fontsize=9)
+    axes.set_xlabel("largest horizontal error, every fix used, m")
+    axes.set_title(plain(f"{report['scenario']}, {report['detector']['name']}"), fontsize=10, loc="left", pad=16)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    files.write_figure(path, figure)
+
+
 def attackers_figure(report: dict[str, Any], path: Path) -> None:
     """Bars of the undetected error of each attacker, with intervals, beside the optimum and the upper bound."""
     played = [row for row in report["rows"] if row["mean_undetected_error_m"] is not None]

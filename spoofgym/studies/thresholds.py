@@ -14,20 +14,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json
+from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json, share_of_alarms
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.recorded_matrix import those_with_thresholds
 from spoofgym.evaluation.report import SCHEMA_VERSION
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import do_all, give_json, moved, program, say
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 
 EXAMPLES = (
     "spoofgym thresholds --scenario liu-flight --arl0 1e3 1e4 1e5",
     "spoofgym thresholds --detector cusum --detector ewma --json -",
+    "spoofgym thresholds --scenario recorded:FOLDER --p-fa 0.1 0.01",
 )
 
 DEFAULT_ARL0S = (1e3, 1e4, 1e5)
+DEFAULT_SHARES = (0.1, 0.01)
 
 
 def threshold_rows(scenario: Scenario, detectors: Sequence[str], arl0s: Sequence[float]) -> list[dict[str, Any]]:
@@ -50,7 +53,30 @@ def threshold_rows(scenario: Scenario, detectors: Sequence[str], arl0s: Sequence
     return sorted(rows, key=lambda row: detectors.index(row["detector"]))
 
 
-def _row(text: str, arl0: float, detector: Detector) -> dict[str, Any]:
+def log_rows(log: Scenario, detectors: Sequence[str], shares: Sequence[float]) -> list[dict[str, Any]]:
+    """A row for each detector and share of alarms in the clean game of a log.
+
+    Args:
+        log: recorded.
+        detectors: specifications.
+        shares: wanted, per epoch.
+
+    Raises:
+        ValueError: a detector that is unknown or does not fit the log, or a log too short for a share.
+    """
+    made = {detector.name: text for text, detector in ((text, make_detector(text)) for text in detectors)}
+    rows = []
+    for share in shares:
+        ready, refused = those_with_thresholds([log], [make_detector(text) for text in detectors], share)
+        for reason in refused.values():
+            say(f"left out: {reason}")
+        for detector in ready:
+            row = _row(made[detector.name], None, detector)
+            rows.append({**row, "false_alarm_probability": share, "from": "the clean log"})
+    return sorted(rows, key=lambda row: detectors.index(row["detector"]))
+
+
+def _row(text: str, arl0: float | None, detector: Detector) -> dict[str, Any]:
     interval = detector.arl0_interval
     return {
         "detector": text,
@@ -63,6 +89,8 @@ def _row(text: str, arl0: float, detector: Detector) -> dict[str, Any]:
 
 
 def _line(row: dict[str, Any]) -> str:
+    if row["asked_arl0"] is None:
+        return f"{row['detector']:<28}{row['false_alarm_probability']:>10g}{row['threshold']:>12.5g}  (the clean log)"
     interval = "" if row["ci95"] is None else f"  95 % [{row['ci95'][0]:.4g}, {row['ci95'][1]:.4g}]"
     reached = "unknown" if row["arl0"] is None else f"{row['arl0']:.4g}"
     given = f"{row['detector']:<28}{row['asked_arl0']:>10g}{row['threshold']:>12.5g}"
@@ -83,7 +111,9 @@ def parser() -> argparse.ArgumentParser:
     add = result.add_argument
     add("--scenario", default="liu-flight", help="in which they hold (default: %(default)s)")
     add("--detector", action="append", help="repeatable (default: every family that fits the scenario)")
-    add("--arl0", type=above_one, nargs="+", default=list(DEFAULT_ARL0S), help="epochs (default: 1e3 1e4 1e5)")
+    add("--arl0", type=above_one, nargs="+", help="epochs (default: 1e3 1e4 1e5)")
+    add("--p-fa", type=share_of_alarms, nargs="+", metavar="P",
+        help="of a recorded log: share of alarms in its clean epochs (default: 0.1 0.01)")
     add_import(result)
     add_json(result)
     return result
@@ -94,7 +124,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     scenario = make_scenario(options.scenario)
-    rows = threshold_rows(scenario, options.detector or fitting(scenario), options.arl0)
+    names = options.detector or fitting(scenario)
+    if not scenario.random and not options.detector:
+        names = [name for name in names if not make_detector(name).members]
+    if scenario.random:
+        if options.p_fa is not None:
+            raise ValueError("--p-fa is of recorded logs; thresholds in a simulated scenario have an --arl0")
+        rows = threshold_rows(scenario, names, options.arl0 or DEFAULT_ARL0S)
+    else:
+        if options.arl0 is not None:
+            raise ValueError("--arl0 is of simulated scenarios; thresholds on a recorded log have a --p-fa")
+        rows = log_rows(scenario, names, options.p_fa or DEFAULT_SHARES)
     report = {"schema_version": SCHEMA_VERSION, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
     out = sys.stderr if options.json == STDOUT else sys.stdout
     do_all(lambda: print("\n".join(map(_line, rows)), file=out), lambda: give_json(report, options.json))

@@ -7,22 +7,26 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_import, add_json
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, share_of_alarms
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.recorded import evaluate_recorded
+from spoofgym.evaluation.recorded_matrix import at_false_alarm_probability
 from spoofgym.evaluation.report import recorded_report
 from spoofgym.program import program
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.studies.evaluate.giving import give
-from spoofgym.studies.presentation import recorded_table
+from spoofgym.studies.evaluate.giving import Output, give
+from spoofgym.studies.presentation import recorded_figure, recorded_table
 
 EXAMPLES = (
     "spoofgym evaluate recorded FOLDER --attack ramp:0.5 --detector snapshot",
+    "spoofgym evaluate recorded FOLDER --detector cusum --p-fa 0.01 --figure log.png",
     "spoofgym evaluate recorded FOLDER,noise_factor=3 --attack jump:20 --json -",
 )
 RECORDED = "recorded"
@@ -40,8 +44,11 @@ def parser() -> argparse.ArgumentParser:
     add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
     add("--attack", action="append", metavar="SPEC",
         help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: ramp:0.5)")
+    add("--p-fa", type=share_of_alarms, metavar="P",
+        help="set every threshold to this share of alarms in the clean log, per epoch (default: as the detector says)")
     add_import(result)
     add_json(result)
+    add_figure(result)
     return result
 
 
@@ -50,14 +57,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     report = _report(options)
-    give(report, recorded_table(report), options.json, console(stderr=options.json == STDOUT), [])
+    outputs: list[Output] = [("figure", options.figure, partial(recorded_figure, report))]
+    give(report, recorded_table(report), options.json, console(stderr=options.json == STDOUT), outputs)
     return 0
 
 
+def recorded_log(text: str) -> Scenario:
+    """The log that a text names: its folder and options, or a specification ``recorded:...``.
+
+    Raises:
+        ValueError: there is none, or it cannot be used.
+    """
+    return make_scenario(text if text.startswith(f"{RECORDED}:") else f"{RECORDED}:{text}")
+
+
 def _report(options: argparse.Namespace) -> dict[str, Any]:
-    log = options.log if options.log.startswith(f"{RECORDED}:") else f"{RECORDED}:{options.log}"
-    scenario = make_scenario(log)
+    scenario = recorded_log(options.log)
     detectors = [make_detector(name) for name in options.detector or ["snapshot"]]
-    ready = calibrated_for_play(detectors, scenario, scenario.fidelities[0])
+    if options.p_fa is not None:
+        ready = at_false_alarm_probability([scenario], detectors, options.p_fa)
+    else:
+        ready = calibrated_for_play(detectors, scenario, scenario.fidelities[0])
     attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]
     return recorded_report(scenario, ready, evaluate_recorded(scenario, attacks, ready))
