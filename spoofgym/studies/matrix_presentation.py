@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,8 +25,10 @@ COLUMNS = 12
 """Attacks side by side on the terminal."""
 CELL = (0.40, 0.27)
 """Width and height of a cell of the heat maps, inches: three digits of 9 pt, which a page shows at 8 to 11 pixels."""
-LEAST_WIDTH = 5.0
-"""Of the heat maps, inches: room for the title."""
+LETTER, LETTER_OF_TITLE, LETTER_OF_NOTE = 0.076, 0.088, 0.064
+"""Mean widths of a letter of 9, 11 and 8 pt, inches, on the safe side."""
+LINE, MARGIN, LEAST_WIDTH, ANGLE = 0.19, 0.12, 4.5, 50.0
+"""Height of a line of a title, space around things, and least width of the figure, inches; of column names, degrees."""
 CURVES_DRAWN = 6
 LEAST_ALARMS = 10
 """Clean games with an alarm that a point must stand on to be drawn: its share is then known within a factor of 2."""
@@ -147,30 +150,52 @@ def _block(title: str, rows: list[str], columns: range, figures: Floats) -> Tabl
 
 
 def matrix_figure(report: dict[str, Any], path: Path) -> None:
-    """Two heat maps, one below the other: detection probability, and mean undetected error."""
+    """Two heat maps, one below the other: detection probability, and mean undetected error.
+
+    Sizes are in inches and follow from the texts, so that cells keep theirs whatever the number of rows and columns.
+    """
     names = short_names(report)
     detectors, attacks, detected = values(report, "detection_probability")
     _, _, error = values(report, "mean_undetected_error_m")
-    width = max(1.9 + CELL[0] * len(attacks), LEAST_WIDTH)
-    height = 2.4 + CELL[1] * len(detectors)
-    figure = new_figure(width, 2 * height, dpi=150, layout="constrained")
-    above, below = figure.subplots(2, 1)
-    labels = [names[name] for name in detectors]
-    _heat(above, labels, attacks, detected, 100.0 * detected, "Blues", 1.0)
-    above.set_title(
-        f"{plain(report['scenario'])}: games with an alarm, %, at {common_rate(report)}\n"
+    labels = [plain(names[name]) for name in detectors]
+    left, below = _margins(labels, list(map(plain, attacks)))
+    width = max(left + CELL[0] * len(attacks) + MARGIN, LEAST_WIDTH)
+    titles = [
+        f"{plain(report['scenario'])}: games with an alarm, %, at {common_rate(report)} "
         "(none: clean games, false alarms)",
-        loc="left",
-        fontsize=11,
+        "Mean undetected error, m; 0 where an alarm came (none: the clean error of navigation)",
+    ]
+    above = [fill(title, int(width / LETTER_OF_TITLE)) for title in titles]
+    notes = "\n".join(fill(note, int(width / LETTER_OF_NOTE)) for note in ensemble_notes(report))
+    rooms = [LINE * (text.count("\n") + 1) + MARGIN for text in above]
+    cells = CELL[1] * len(detectors)
+    foot = LINE * (notes.count("\n") + 1) if notes else 0.0
+    height = sum(rooms) + 2 * (cells + below) + foot + MARGIN
+    figure = new_figure(width, height, dpi=150)
+    top = height - MARGIN
+    shown = (
+        (detected, 100.0 * detected, "Blues", 1.0),
+        (np.log10(np.maximum(error, 0.1)), error, "Oranges", None),
     )
-    _heat(below, labels, attacks, np.log10(np.maximum(error, 0.1)), error, "Oranges", None)
-    below.set_title(
-        "mean undetected error, m, 0 where an alarm came\n(none: the clean error of navigation)",
-        loc="left",
-        fontsize=11,
-    )
-    figure.supxlabel("\n".join(ensemble_notes(report)), fontsize=8, ha="left", x=0.01)
+    for title, room, (colour, text, palette, most) in zip(above, rooms, shown, strict=True):
+        figure.text(MARGIN / width, top / height, title, fontsize=11, va="top")
+        bottom = top - room - cells
+        place = (left / width, bottom / height, CELL[0] * len(attacks) / width, cells / height)
+        _heat(figure.add_axes(place), labels, attacks, colour, text, palette, most)
+        top = bottom - below
+    figure.text(MARGIN / width, MARGIN / height, notes, fontsize=8, va="bottom")
     files.write_figure(path, figure)
+
+
+def _margins(rows: list[str], columns: list[str]) -> tuple[float, float]:
+    """Left of the cells and below them, inches: the labels of the rows, and those of the columns at their angle."""
+    lengths = [LETTER * len(name) for name in columns]
+    slope = np.radians(ANGLE)
+    leftwards = max(length * np.cos(slope) - CELL[0] * (place + 0.5) for place, length in enumerate(lengths))
+    return (
+        max(LETTER * max(map(len, rows)), leftwards) + MARGIN,
+        max(lengths) * np.sin(slope) + 2 * MARGIN,
+    )
 
 
 def _heat(
@@ -188,7 +213,7 @@ def _heat(
             ink = "white" if brightness[i, j] < 0.45 else "black"
             axes.text(j, i, _figure(float(text[i, j])), ha="center", va="center", fontsize=9, color=ink)
     names = list(map(plain, columns))
-    axes.set_xticks(range(len(names)), names, rotation=50, ha="right", rotation_mode="anchor", fontsize=9)
+    axes.set_xticks(range(len(names)), names, rotation=ANGLE, ha="right", rotation_mode="anchor", fontsize=9)
     axes.set_yticks(range(len(rows)), list(map(plain, rows)), fontsize=9)
     axes.set_xticks(np.arange(0.5, len(columns) - 1), minor=True)
     axes.set_yticks(np.arange(0.5, len(rows) - 1), minor=True)

@@ -1,10 +1,12 @@
 """The matrix as a user asks for it: JSON alone, tables, figures, bad input."""
 
+import itertools
 import json
 
 import numpy as np
 import pytest
 
+from spoofgym.studies import matrix_presentation
 from spoofgym.studies.evaluate import matrix
 from spoofgym.studies.matrix_presentation import drawn_curves, ensemble_notes, short_names, values
 
@@ -122,3 +124,36 @@ def test_an_impossible_rate_is_refused(arl0, capsys):
     with pytest.raises(SystemExit):
         matrix.main(["--arl0", arl0])
     assert "argument --arl0: expected a" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("detectors", "attacks"),
+    [
+        (["snapshot"], ["ramp:0.2"]),
+        (["snapshot", "signed-mean:n=120"], ["none", "tracking-error:ramp:0.2,sigma=1,time=20"]),
+        (["snapshot", "acna", "ensemble"], [f"ramp:{rate}" for rate in range(1, 19)]),
+    ],
+)
+def test_titles_names_and_numbers_of_a_heat_map_are_whole_and_apart(detectors, attacks, tmp_path, monkeypatch):
+    """Whatever the number of rows and columns: no text leaves the figure, and no number touches the next one."""
+    drawn = []
+    monkeypatch.setattr(matrix_presentation.files, "write_figure", lambda path, figure: drawn.append(figure))
+    rows = [
+        {"detector": one, "attack": other, "detection_probability": 1.0, "mean_undetected_error_m": 238.0}
+        for one in detectors
+        for other in attacks
+    ]
+    members = [{"name": name} for name in detectors]
+    scenario = "liu-flight:horizon=250,imu=tactical"
+    report = {"scenario": scenario, "arl0": 1e4, "episodes": 100, "detectors": members, "rows": rows}
+    matrix_presentation.matrix_figure(report, tmp_path / "heat.png")
+    (figure,) = drawn
+    figure.canvas.draw()
+    texts = [text for text in figure.findobj(lambda part: hasattr(part, "get_text")) if text.get_text()]
+    for text in texts:
+        box, whole = text.get_window_extent(), figure.bbox
+        assert 0 <= box.x0 < box.x1 <= whole.x1, text.get_text()
+        assert 0 <= box.y0 < box.y1 <= whole.y1, text.get_text()
+    numbers = [text.get_window_extent() for text in texts if text.get_text() in ("100", "238")]
+    assert len(numbers) == 2 * len(rows)
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(numbers, 2))
