@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from spoofgym.report.aggregates import aggregate_figures
 from spoofgym.report.figures import Bar, Bars, Mark, Section, TableFigure
 from spoofgym.report.tables import Report, facts_of, interval_of, table_of
 from spoofgym.studies.presentation import BASELINES
@@ -24,7 +25,7 @@ def attackers_sections(report: Report) -> list[Section]:
         bars=[_bar(row) for row in played],
         marks=marks,
     )
-    return [Section(title, facts_of(report), [bars, _numbers(report)])]
+    return [Section(title, facts_of(report), [bars, *aggregate_figures(report), _numbers(report)])]
 
 
 def _bar(row: Report) -> Bar:

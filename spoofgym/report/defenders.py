@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from spoofgym.report.aggregates import aggregate_figures
 from spoofgym.report.figures import Bar, Bars, Figure, Layer, Mark, Matrix, Section
 from spoofgym.report.tables import Report, facts_of, interval_of, percent, table_of
 
@@ -24,8 +25,10 @@ def defenders_sections(report: Report, beside: Sequence[Report] = ()) -> list[Se
         rows = [row for row in report["rows"] if row["held_out"] == held_out]
         pooled = sorted((row for row in rows if _pooled(row)), key=lambda row: float(row["mean_error_m"]))
         if pooled:
-            figures.append(_bars(report, pooled, population, bounds_of(report["scenario"], population, beside)))
-            figures.append(_by_attack(rows, pooled, population))
+            attacks = report.get("attack") or f"{population} attacks"
+            figures.append(_bars(report, pooled, attacks, bounds_of(report["scenario"], population, beside)))
+            figures.append(_by_attack(rows, pooled, attacks))
+    figures += aggregate_figures(report)
     if report["comparisons"]:
         figures += _differences(report)
     if report["gaps"]:
@@ -50,7 +53,7 @@ def _pooled(row: Report) -> bool:
     return str(row["attack"]).startswith(POOLED)
 
 
-def _bars(report: Report, rows: list[Report], population: str, marks: list[Mark]) -> Bars:
+def _bars(report: Report, rows: list[Report], attacks: str, marks: list[Mark]) -> Bars:
     best = rows[0]
     bars = []
     for row in rows:
@@ -59,7 +62,7 @@ def _bars(report: Report, rows: list[Report], population: str, marks: list[Mark]
         bars.append(Bar(row["defender"], row["mean_error_m"], low, high, report["kinds"][row["defender"]], note))
     bound = "".join(f" The Bayesian bound is {mark.value:.2f} m." for mark in marks)
     return Bars(
-        title=f"Mean error, {population} attacks",
+        title=f"Mean error, {attacks}",
         summary=f"{best['defender']} has the least mean error, {best['mean_error_m']:.2f} m, of {len(rows)} defenders."
         f"{bound} The axis is logarithmic; “clean out” is the share of clean fixes that are excluded.",
         unit="mean horizontal error of the real-time output, m (95 % interval)",
@@ -89,7 +92,7 @@ def _by_attack(rows: list[Report], pooled: list[Report], population: str) -> Mat
     )
     detected = Layer("attacks found, %", table(lambda row: percent(row["detection_probability"])), most=100.0)
     return Matrix(
-        title=f"Defenders by attack, {population} attacks",
+        title=f"Defenders by attack, {population}",
         summary=f"{len(defenders)} defenders and {len(attacks)} kinds of games; “none” are games without an attack.",
         corner="defender",
         rows=defenders,

@@ -40,7 +40,7 @@ def stanford_figure(title: str, diagram: Report) -> Stanford:
     """A Stanford diagram as `StanfordDiagram.content` gives it."""
     regions = diagram["regions"]
     total = max(sum(regions.values()), 1)
-    told = ", ".join(f"{name} {count / total:.3%}" for name, count in regions.items())
+    told = ", ".join(f"{name} {100.0 * count / total:.3g} %" for name, count in regions.items())
     return Stanford(
         title=f"Stanford diagram, {title}",
         summary=f"Of {total} epochs without an alarm: {told}. The alert limit is {diagram['alert_limit_m']:g} m.",

@@ -191,3 +191,14 @@ def test_tables_write_what_is_nested_as_text():
     table = figure(report, TableFigure)
     row = dict(zip(table.columns, table.rows[0], strict=True))
     assert (row["ci95_m from"], row["ci95_m to"], row["extra"]) == (2.0, 4.0, '{"a": [1, 2]}')
+
+
+def test_runs_of_one_setting_are_drawn_together():
+    row = {"runs": ["runs/a", "runs/b"], "games": 10, "mean_m": 50.0, "ci95_m": [48.0, 52.0], "iqm_m": 51.0}
+    report = {**reports.attackers(), "aggregates": [{**row, "iqm_ci95_m": [49.0, 53.0]}]}
+    bars = figure(report, Bars, "Runs of one setting")
+    assert [(bar.value, bar.low, bar.high) for bar in bars.bars] == [(50.0, 48.0, 52.0), (51.0, 49.0, 53.0)]
+
+
+def test_defenders_against_one_attack_are_named_by_it():
+    assert figure({**reports.defenders(), "attack": "ramp:0.5"}, Bars).title == "Mean error, ramp:0.5"

@@ -45,15 +45,14 @@
     const make = figure.logarithmic ? page.logarithmic : page.linear;
     const scale = make(span(figure), [labels + 4, width - values]);
     const groups = groupsOf(figure);
-    const drawing = page.drawing(width, bottom + 44, figure.title);
+    const drawing = page.drawing(width, bottom + 24, figure.title);
     for (const tick of scale.ticks(Math.max(3, Math.floor((width - labels - values) / 80)))) {
       drawing.append(page.svg("line", { x1: scale(tick), x2: scale(tick), y1: head, y2: bottom, class: "grid" }));
       drawing.append(page.svg("text", { x: scale(tick), y: bottom + 16, "text-anchor": "middle", class: "muted" }, page.number(tick)));
     }
-    drawing.append(page.svg("text", { x: labels + 4, y: bottom + 36, class: "muted" }, figure.unit));
-    const marks = page.svg("g");
-    drawing.append(marks);
-    figure.bars.forEach((bar, place) => drawBar(drawing, figure, bar, { scale, groups, labels, narrow, width, middle: head + row * place + (narrow ? row - 14 : row / 2), noted }));
+    const [bases, marks, tops] = [page.svg("g"), page.svg("g"), page.svg("g")];
+    drawing.append(bases, marks, tops);
+    figure.bars.forEach((bar, place) => drawBar({ bases, tops }, figure, bar, { scale, groups, labels, narrow, width, middle: head + row * place + (narrow ? row - 14 : row / 2), noted }));
     figure.marks.forEach((mark, place) => {
       const x = scale(mark.value);
       marks.append(page.svg("line", { x1: x, x2: x, y1: head - 4, y2: bottom, stroke: page.colour("bound"), "stroke-width": 1.5, "stroke-dasharray": page.dashes[(place + 1) % 4].join(" ") }));
@@ -63,35 +62,35 @@
       marks.append(page.svg("line", { x1: x, x2: x, y1: 4 + 18 * place, y2: head, stroke: page.colour("bound"), "stroke-width": 1 }));
     });
     const legend = [...groups].filter(([name]) => name).map(([name, { colour, shape }]) => ({ name, colour, shape }));
-    node.replaceChildren(...(legend.length > 1 ? [page.legend(legend)] : []), drawing);
+    node.replaceChildren(...(legend.length > 1 ? [page.legend(legend)] : []), drawing, page.element("div", { class: "unit" }, figure.unit));
   }
 
-  function drawBar(drawing, figure, bar, { scale, groups, labels, narrow, width, middle, noted }) {
+  function drawBar({ bases, tops }, figure, bar, { scale, groups, labels, narrow, width, middle, noted }) {
     const { colour, shape } = groups.get(bar.group);
     const [least] = span(figure);
     const above = noted ? 28 : 14;
     const named = narrow && !noted ? `${bar.label}: ${written(bar)}` : bar.label;
-    const place = narrow ? { x: 2, y: middle - above } : { x: labels - 4, y: middle + 4, "text-anchor": "end" };
+    const place = narrow ? { x: 2, y: middle - above, class: "halo" } : { x: labels - 4, y: middle + 4, "text-anchor": "end" };
     const label = page.svg("text", place, cut(named, narrow ? width : labels));
     label.append(page.svg("title", {}, `${bar.label}: ${written(bar)}`));
-    drawing.append(label);
-    if (narrow && noted) drawing.append(page.svg("text", { x: 2, y: middle - 14, class: "muted" }, cut(written(bar), width)));
+    tops.append(label);
+    if (narrow && noted) tops.append(page.svg("text", { x: 2, y: middle - 14, class: "muted halo" }, cut(written(bar), width)));
     if (bar.value === null) {
-      if (!narrow) drawing.append(page.svg("text", { x: labels + 8, y: middle + 4, class: "muted" }, bar.note || "–"));
+      if (!narrow) tops.append(page.svg("text", { x: labels + 8, y: middle + 4, class: "muted" }, bar.note || "–"));
       return;
     }
     const x = scale(bar.value);
     const zero = scale(figure.logarithmic ? least : Math.max(0, least));
     if (!figure.logarithmic) {
-      drawing.append(page.svg("rect", { x: Math.min(zero, x), y: middle - 8, width: Math.max(Math.abs(x - zero), 1), height: 16, fill: colour }));
+      bases.append(page.svg("rect", { x: Math.min(zero, x), y: middle - 8, width: Math.max(Math.abs(x - zero), 1), height: 16, fill: colour }));
     }
     if (bar.low !== null && bar.high !== null) {
       const ends = [scale(Math.max(bar.low, figure.logarithmic ? least : -Infinity)), scale(bar.high)];
       const d = `M${ends[0]} ${middle - 5}V${middle + 5}M${ends[0]} ${middle}H${ends[1]}M${ends[1]} ${middle - 5}V${middle + 5}`;
-      drawing.append(page.svg("path", { d, stroke: page.colour("ink"), "stroke-width": 1.5, fill: "none" }));
+      tops.append(page.svg("path", { d, stroke: page.colour("ink"), "stroke-width": 1.5, fill: "none" }));
     }
-    if (figure.logarithmic) drawing.append(page.mark(shape, x, middle, 4, colour));
-    if (!narrow) drawing.append(page.svg("text", { class: "halo", x: Math.max(x, bar.high === null ? x : scale(bar.high), zero) + 8, y: middle + 4 }, written(bar)));
+    if (figure.logarithmic) tops.append(page.mark(shape, x, middle, 4, colour));
+    if (!narrow) tops.append(page.svg("text", { class: "halo", x: Math.max(x, bar.high === null ? x : scale(bar.high), zero) + 8, y: middle + 4 }, written(bar)));
   }
 
   /** A text that fits into so many pixels. */

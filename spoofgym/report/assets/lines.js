@@ -31,7 +31,7 @@
       const ends = [figure.x[0], figure.x[figure.x.length - 1]];
       const room = ends[0] === ends[1] ? 1 : 0;
       const options = page.plotOptions(page.width(sheet), HEIGHT, { xLabel: figure.x_label, xRange: [ends[0] - room, ends[1] + room], scale: { range: span(figure) }, whole: figure.whole });
-      options.axes[0].values = (_, marks) => marks.map((mark) => page.number(mark));
+      options.axes[0].values = (_, marks) => marks.map((mark) => page.compact(mark));
       const data = [figure.x];
       options.bands = [];
       figure.lines.forEach((line, place) => {

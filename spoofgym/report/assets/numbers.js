@@ -13,6 +13,12 @@ page.number = (value, digits = 3) => {
   return (text.includes(".") ? text.replace(/\.?0+$/, "") : text).replace("-", "−");
 };
 
+/** A large number in few characters: 1.2 M, 30 k. */
+page.compact = (value) => {
+  const [unit, name] = [[1e9, " G"], [1e6, " M"], [1e3, " k"]].find(([least]) => Math.abs(value) >= 10 * least || (least > 1e3 && Math.abs(value) >= least)) || [1, ""];
+  return `${page.number(value / unit)}${name}`;
+};
+
 /** A probability as percent. */
 page.percent = (value) => (value === null || value === undefined ? "–" : `${page.number(100 * value)} %`);
 

@@ -21,8 +21,12 @@
         colour: page.seriesColour([2, 4, 5][place % 3]),
         dash: [[4, 2], [12, 4], [1, 2]][place % 3],
       })),
+      ...limits.map(([name, limit]) => ({ name, values: game.time.map(() => limit), colour: page.colour("bad"), dash: [10, 3], width: 1 })),
     ];
-    const top = 1.08 * Math.max(largest([game.error, game.errorUp, ...levels.map((level) => level.values_m)]), 1.3 * largest([game.sigma_m.horizontal]), 1);
+    let top = 1.08 * Math.max(largest([game.error, game.errorUp, ...levels.map((level) => level.values_m)]), 1.3 * largest([game.sigma_m.horizontal]), 1);
+    const named = new Map(levels.map((level) => [`alert limit, ${level.direction}`, level.alert_limit_m]));
+    const limits = [...named].filter(([, limit]) => limit < 2 * top);
+    if (limits.length) top = Math.max(top, ...limits.map(([, limit]) => 1.05 * limit));
     return { title: "Error of the real-time output", series: lines, scale: () => ({ range: [0, top] }), height: 210 };
   }
 

@@ -20,7 +20,7 @@
     const body = page.element("tbody");
     const heads = table.columns.map((column, place) => {
       const button = page.element("button", { type: "button", click: () => sort(place) }, column);
-      return page.element("th", { scope: "col" }, button);
+      return page.element("th", { scope: "col", class: table.rows.some((row) => typeof row[place] === "string" && row[place] !== "inf") ? "text" : null }, button);
     });
     const fill = (rows) =>
       body.replaceChildren(
