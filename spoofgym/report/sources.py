@@ -38,7 +38,11 @@ VIEWS: dict[str, Callable[[Report], list[Section]]] = {
     "benchmark": benchmark_sections,
     "integrity": integrity_sections,
     **dict.fromkeys(
-        ("tuning", "thresholds", "fidelity-of-thresholds", "acna-study", "wrong-shadow", "reproduction"), plain_section
+        (
+            *("tuning", "thresholds", "fidelity of thresholds", "acna-study", "wrong-shadow", "reproduction"),
+            *("recorded-ranges", "references"),
+        ),
+        plain_section,
     ),
 }
 """Makes sections of a report, by its kind."""

@@ -24,13 +24,28 @@ def table_of(title: str, summary: str, rows: Sequence[Mapping[str, Any]]) -> Tab
 
 
 def plain_section(report: Report) -> list[Section]:
-    """A report of rows as a table: what it has beside them is told above."""
-    rows = report["rows"]
-    what = str(report["kind"]).replace("-", " ")
-    about = report.get("paper") or report.get("scenario")
-    title = what[:1].upper() + what[1:] + (f": {about}" if about else "")
-    summary = f"{len(rows)} rows. A click on the name of a column sorts them."
-    return [Section(title, facts_of(report), [table_of(title, summary, rows)])]
+    """A report as a table of each list of rows in it; what it has beside them is told above.
+
+    Raises:
+        ValueError: there are no rows.
+    """
+    lists = {name: rows for name, rows in report.items() if _are_rows(rows)}
+    if not lists:
+        raise ValueError("it has no rows")
+    about = next((str(report[name]) for name in ("paper", "scenario", "log", "benchmark") if name in report), "")
+    title = _capital(str(report["kind"])) + (f": {about}" if about else "")
+    sort = "A click on the name of a column sorts them."
+    tables = [table_of(_capital(name), f"{len(rows)} rows. {sort}", rows) for name, rows in lists.items()]
+    return [Section(title, facts_of(report), tables)]
+
+
+def _are_rows(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
+
+
+def _capital(name: str) -> str:
+    words = name.replace("-", " ").replace("_", " ")
+    return words[:1].upper() + words[1:]
 
 
 def facts_of(report: Report) -> list[tuple[str, str]]:
@@ -40,7 +55,7 @@ def facts_of(report: Report) -> list[tuple[str, str]]:
         if name in UNTOLD or not isinstance(value, str | int | float | bool):
             continue
         text = ("yes" if value else "no") if isinstance(value, bool) else _written(value)
-        facts.append((NAMES.get(name, name[:1].upper() + name[1:].replace("_", " ")), text))
+        facts.append((NAMES.get(name, _capital(name)), text))
     detector = report.get("detector")
     if isinstance(detector, Mapping):
         threshold = "" if detector["threshold"] is None else f" above {detector['threshold']:.4g}"

@@ -178,7 +178,7 @@ def test_a_folder_without_anything_is_named(tmp_path):
 
 @pytest.mark.parametrize("kind", reports.REPORTS)
 def test_a_damaged_report_is_refused_in_one_line(kind, tmp_path):
-    for damage in ({"rows": None, "results": 3, "tasks": None}, {"rows": [3], "results": [{}], "tasks": [{}]}):
+    for damage in ({"rows": None, "results": 3, "tasks": None}, {"rows": [3], "results": [3], "tasks": [3]}):
         with pytest.raises(ValueError, match="a damaged report of kind") as refusal:
             write_page(tmp_path / "page.html", [{**reports.REPORTS[kind](), **damage, "summary": None}])
         assert "\n" not in str(refusal.value)
