@@ -14,8 +14,8 @@ from spoofgym.cli.commands import find
 from tests.docs.pages import ROOT, Block, blocks, commands, name, pages
 
 NUMBER = r"\d+(?:\.\d+)?"
-ELSEWHERE = {"docs/how-to/detector.md"}
-"""Pages whose blocks another test runs: tests/test_tutorial.py."""
+ELSEWHERE = {"docs/how-to/detector.md", "docs/how-to/cluster.md"}
+"""Pages whose blocks another test runs: tests/test_tutorial.py, and tests/optional/test_rllib.py with Ray."""
 SLOW = {"docs/how-to/train-sb3.md", "docs/how-to/train-own-ppo.md", "docs/how-to/duel.md"}
 WITH_BLOCKS = [path for path in pages() if blocks(path) and name(path) not in ELSEWHERE]
 LOGS = ROOT.parent / "shared" / "data"
