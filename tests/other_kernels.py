@@ -16,7 +16,7 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 NOT_NUMERICAL = (
-    *("train", "policies", "learning", "kernels", "test_package.py", "test_readme.py", "test_tutorial.py"),
+    *("train", "policies", "learning", "kernels", "installed", "test_package.py", "test_readme.py", "test_tutorial.py"),
     *("test_animation.py", "test_archive.py", "test_command_line.py", "test_console.py", "test_files.py"),
     "test_program.py",
     *("test_copies.py", "envs/test_copied_games.py", "envs/test_actions.py", "envs/test_sb3.py", "test_conftest.py"),
