@@ -106,3 +106,9 @@ def test_the_version_is_told_once_and_cited(metadata: Message) -> None:
     assert cited.group(1) == spoofgym.__version__
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.search(rf"^## \[(Unreleased|{re.escape(spoofgym.__version__)})\]", changes, flags=re.MULTILINE)
+
+
+def test_the_page_of_the_installation_lists_every_extra(metadata: Message) -> None:
+    text = (ROOT / "docs" / "start" / "install.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `(\w+)` \|", text.partition("## Extras")[2].partition("\n## ")[0], flags=re.MULTILINE)
+    assert set(listed) == set(metadata.get_all("Provides-Extra", []))
