@@ -217,12 +217,15 @@ class DefenderConfig:
     error_clip: float = 5.0
     exclusion_cost: float = 0.05
     coupling: str | None = None
+    bank: str | None = None
     threads: int = 1
 
     def __post_init__(self) -> None:
         owner = self.owner
         _check_coupling(owner, self.coupling)
         validation.text(owner, "fidelity", self.fidelity)
+        if self.bank is not None:
+            validation.text(owner, "bank", self.bank)
         scale = self.error_scale
         _set(
             self,

@@ -143,6 +143,30 @@ class DefenderEnv(SingleEnv):
     - Alert limits are the scenario's `alert_limits`: 556 m horizontally and 50 m vertically, or those of
       `kujur-flight:horizontal_alert_limit=40,vertical_alert_limit=35`.
 
+    With `bank="multiple-hypothesis"`, or that with options of its own, these entries come last. They tell what the bank
+    of hypotheses of that response (`docs/reference/responses.md`) expects, D being the entries of the depth table:
+
+    | Name | Unit | Scale (drive) |
+    |---|---|---|
+    | expected error now, and ahead, fix used; the same two, fix left out | m | 2 |
+    | expected gain of exclusion | m | 1 |
+    | depth of the least expected error | epochs | 20 |
+    | expected loss at depth 0, 3, ..., for each entry of the table | m | 1 |
+    | probability of a pull | 1 | not squashed |
+    | log odds of a pull | 1 | 5 |
+    | probability of multipath | 1 | not squashed |
+    | expected pull | m | 10 |
+    | expected rate of the pull | m/s | 1 |
+    | spread of the hypotheses | m | 10 |
+
+    - The expected error is that of the horizontal position; "ahead" is after ten seconds without fixes (`ahead` of the
+      bank). The gain is the mean of both moments with the fix, minus that of the best exclusion which the action can
+      still ask for; the depth is that of this exclusion. The loss at a depth is what it errs more than the best depth.
+    - A defender that excludes where the gain is positive, at the depth told, is `multiple-hypothesis` with the depth
+      table of the game.
+    - It needs a scenario with a linear model and an inertial solution. Scales in m and m/s are parts of the scenario's
+      `defender_scale` (0.2, 0.1 and 1 of it).
+
     `env.unwrapped.game.fields` gives the list of an environment.
 
     ## Rewards
@@ -209,6 +233,7 @@ class DefenderEnv(SingleEnv):
     | `error_clip` | `5.0` | largest cost of the error in a step |
     | `exclusion_cost` | `0.05` | of a clean fix left out |
     | `coupling` | `None` | "loose" (the filter takes fixes) or "tight" (ranges); None: what the scenario is |
+    | `bank` | `None` | a `multiple-hypothesis` response whose bank the defender sees; None: it sees none |
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.chi_square import quantile
+from spoofgym.envs.bank_features import BankFeatures
 from spoofgym.envs.observation import Field, Squash
 from spoofgym.envs.range_features import RangeFeatures
 from spoofgym.geodesy import AXES
@@ -146,13 +147,30 @@ class DefenderFeatures:
 
     Attributes:
         fields: the entries, in order.
+        bank: what is seen of a bank of hypotheses; None = nothing.
         onset_depth: epochs since the estimated onset, (N,).
     """
 
     def __init__(
-        self, scenario: Scenario, simulation: Simulation, detectors: Sequence[str], num_lanes: int
+        self,
+        scenario: Scenario,
+        simulation: Simulation,
+        detectors: Sequence[str],
+        num_lanes: int,
+        bank: str | None = None,
     ) -> None:
-        """Allocate the memory of ``num_lanes`` lanes, which see the ``detectors`` of these names."""
+        """Allocate the memory of ``num_lanes`` lanes.
+
+        Args:
+            scenario: of the game.
+            simulation: of the game.
+            detectors: names of those that are seen.
+            num_lanes: N.
+            bank: specification of the bank of hypotheses that is seen; None = none.
+
+        Raises:
+            ValueError: the bank is none, or needs what the scenario does not give.
+        """
         self._simulation = simulation
         ranges = RANGES in scenario.offers
         dimension = 3 if ranges else scenario.dimension
@@ -161,6 +179,10 @@ class DefenderFeatures:
         self._ranges = RangeFeatures(scenario, simulation, detectors) if ranges else None
         if self._ranges is not None:
             self.fields += self._ranges.fields
+        self._behind_ranges = len(self.fields)
+        self.bank = None if bank is None else BankFeatures(scenario, simulation, bank)
+        if self.bank is not None:
+            self.fields += self.bank.fields
         self._detectors = tuple(detectors)
         self._thresholds = np.array([simulation.detectors[name].threshold for name in detectors])
         self._onset = OnsetEstimator(num_lanes)
@@ -187,6 +209,8 @@ class DefenderFeatures:
         memory.means[lanes], memory.residual[lanes], memory.velocity[lanes] = 0.0, 0.0, np.nan
         memory.suspicion[lanes], memory.old_alarm[lanes] = False, False
         memory.quiet[lanes], memory.agreeing[lanes] = 0, 0
+        if self.bank is not None:
+            self.bank.reset(lanes)
 
     @property
     def suspicion(self) -> Flags:
@@ -235,7 +259,9 @@ class DefenderFeatures:
         )
         _fill(lanes, seen, told, self._quiet_bounds, self._memory, self._raw)
         if self._ranges is not None:
-            self._raw[lanes, self._common :] = self._ranges()[lanes]
+            self._raw[lanes, self._common : self._behind_ranges] = self._ranges()[lanes]
+        if self.bank is not None:
+            self._raw[lanes, self._behind_ranges :] = self.bank.update(lanes, excluding)
 
     def _coasting_time(self, index: Runs, coast: Runs) -> Floats:
         """Time without a fix that was used, (N,), s, beyond the usual interval; epochs that are missing count."""

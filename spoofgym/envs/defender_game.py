@@ -85,12 +85,13 @@ class DefenderGame(OneSeatGame):
             num_lanes,
             fidelity=config.fidelity,
             threads=config.threads,
-            demands=demands_on(scenario),
+            demands=demands_on(scenario, config.bank),
             confounders=self.confounders,
             on_divergence="hold",
             streams=streams,
         )
-        self.seat = DefenderSeat(simulation, config, names)
+        with validation.argument(OWNER, "bank"):
+            self.seat = DefenderSeat(simulation, config, names)
         self.privileged = PrivilegedState(simulation, self.attacks, self.confounders, scenario.defender_scale)
         super().__init__(simulation, defender=self.seat)
 

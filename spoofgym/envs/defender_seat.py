@@ -24,9 +24,15 @@ from spoofgym.simulation import Simulation
 USE, EXCLUDE = 0, 1
 
 
-def demands_on(scenario: Scenario) -> Demands:
-    """What a defender in the seat asks of the scenario's navigator: to leave fixes out, and the deepest backtrack."""
-    return Demands(excludes=True, history=max(scenario.history, *scenario.depth_table))
+def demands_on(scenario: Scenario, bank: str | None = None) -> Demands:
+    """What a defender in the seat asks of the scenario's navigator.
+
+    Args:
+        scenario: of the game.
+        bank: of hypotheses that it sees, if any: it looks at the unaided inertial solution.
+    """
+    history = max(scenario.history, *scenario.depth_table)
+    return Demands(excludes=True, history=history, auxiliary=bank is not None)
 
 
 @dataclass(frozen=True)
@@ -114,11 +120,14 @@ class DefenderSeat:
             simulation: the shared world; its navigator was built with `demands_on` its scenario.
             config: what the defender is paid; its scenario, attacks and fidelity are those of the simulation.
             detectors: names of the simulation's detectors whose statistics the defender sees.
+
+        Raises:
+            ValueError: the bank of the ``config`` is none, or needs what the scenario does not give.
         """
         scenario, num_lanes = simulation.scenario, simulation.num_runs
         self.config, self.simulation = config, simulation
         self.depths: Runs = np.array(scenario.depth_table, dtype=np.int64)
-        self.features = DefenderFeatures(scenario, simulation, detectors, num_lanes)
+        self.features = DefenderFeatures(scenario, simulation, detectors, num_lanes, config.bank)
         self.fields = self.features.fields
         self.observation_space = observation_space(self.fields)
         self.space = spaces.MultiDiscrete([2, len(self.depths)] + [2] * scenario.slots)

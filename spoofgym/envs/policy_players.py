@@ -92,7 +92,7 @@ class PolicyDefender(Response):
         """Let ``policy`` decide in games of ``scenario``; ``name`` is the specification that builds this response."""
         self._policy, self._name = policy, name
         self._config = defender_config(policy)
-        self.demands = demands_on(scenario)
+        self.demands = demands_on(scenario, self._config.bank)
 
     @property
     def name(self) -> str:

@@ -121,7 +121,7 @@ def _checked(name: str, value: Any) -> Any:
         right = bool(value) and all(isinstance(item, str) or _is_weighted(item) for item in value)
     elif name in ONE or name in SEVERAL:
         right = isinstance(value, str)
-    elif name == "shadow":
+    elif name in ("shadow", "bank"):
         right = value is None or isinstance(value, str)
     else:
         right = True

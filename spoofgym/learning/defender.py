@@ -64,6 +64,8 @@ def parser() -> argparse.ArgumentParser:
     add("--attacks", help="the population of opponents (default: training)")
     add("--detector", action="append",
         help=f"whose statistics the defender sees; repeatable (default: {', '.join(DETECTORS)})")
+    add("--bank", metavar="SPEC",
+        help="bank of hypotheses that the defender sees, too: multiple-hypothesis, with options (default: none)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
     add("--spoofer", metavar="SPEC",
         help="train in the duel, against this spoofer: ramp:0.5, training, policy:FOLDER, pool:A+B, ...")
@@ -85,16 +87,19 @@ def asked_run(given: dict[str, Any]) -> Run:
     """The run that the options of the command line ask for.
 
     Raises:
-        ValueError: an option of the duel without a spoofer, attacks beside a spoofer, or a part that is not valid.
+        ValueError: an option of the duel without a spoofer, attacks or a bank beside a spoofer, or a part that is not
+            valid.
     """
     settings = {name: given[name] for name in asdict(Settings()) if name in given}
     arguments: dict[str, Any] = {"detectors": tuple(given.get("detector", DETECTORS))}
-    names = ("scenario", "attacks", "fidelity", "threads", "spoofer", "payoff")
+    names = ("scenario", "attacks", "bank", "fidelity", "threads", "spoofer", "payoff")
     arguments |= {name: given[name] for name in names if name in given}
     if "payoff" in given and "spoofer" not in given:
         raise ValueError("--payoff is of a duel: name the --spoofer, too")
     if "spoofer" in given and "attacks" in given:
         raise ValueError("--spoofer names who attacks in a duel: leave --attacks out")
+    if "spoofer" in given and "bank" in given:
+        raise ValueError("nobody sees a bank in a duel: leave --bank or --spoofer out")
     config: Any = configure(DuelDefenderConfig if "spoofer" in given else DefenderConfig, arguments)
     return Run(config, Settings(**settings), given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
 

@@ -3,8 +3,10 @@
 In every lane of Defender-v0 the features say whether a classical defender would exclude (a signed mean of 5 epochs,
 until 5 fixes in a row agree) and when it believes that the attack began. A teacher excludes where they say so, perhaps
 until more fixes agree, and goes back either to the estimated onset plus a margin, rounded up to the depth table, or a
-fixed depth; of all these the one whose error is least on games of the training population is taken. A policy that is
-first taught to do that starts where the best classical defenders stand, and what reinforcement adds is its own.
+fixed depth. Where the defender sees a bank of hypotheses, a teacher follows that: it excludes where the error is
+expected to be less by more than a margin. Of all these the one whose error is least on games of the training population
+is taken. A policy that is first taught to do that starts where the best classical defenders stand, and what
+reinforcement adds is its own.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ from spoofgym.responses.onset_depth import DEFAULT_MARGIN
 GAMES = 4
 """Games of every lane that a policy is taught from."""
 REUSES = (5, 12)
+MARGINS = (0.0, 0.01, 0.03)
+"""By how much exclusion must be expected to err less than use, as shares of the scenario's `defender_scale`."""
 FEW, MANY = 4, 24
 """Games of every lane in which teachers are compared, all of them and the best quarter."""
 PASSES = 30
@@ -60,14 +64,44 @@ class Teacher:
         return action
 
 
-def best_teacher(vector: DefendingVectorEnv, seed: int) -> Teacher:
+@dataclass(frozen=True)
+class BankTeacher:
+    """The defender that follows the bank of hypotheses it sees.
+
+    Exclusion is for good, while the use of a fix can be taken back later: a margin in favour of use pays.
+
+    Attributes:
+        margin: by how much exclusion must be expected to err less, m.
+    """
+
+    margin: float
+
+    def act(self, game: DefenderGame | DuelDefenderGame) -> NDArray[np.int64]:
+        """What it does in the present epoch, (N, 2)."""
+        bank = game.seat.features.bank
+        assert bank is not None
+        return np.stack([bank.gain > self.margin, bank.place], axis=1).astype(np.int64)
+
+
+AnyTeacher = Teacher | BankTeacher
+
+
+def teachers_of(vector: DefendingVectorEnv) -> list[AnyTeacher]:
+    """Those that see what the learner sees."""
+    seat = vector.game.seat
+    if seat.features.bank is not None:
+        return [BankTeacher(margin * vector.game.scenario.defender_scale) for margin in MARGINS]
+    return [Teacher(depth, reuse) for depth in (None, *range(len(seat.depths))) for reuse in REUSES]
+
+
+def best_teacher(vector: DefendingVectorEnv, seed: int) -> AnyTeacher:
     """The one whose error is least on common games: all are tried on a few, the best quarter on many."""
-    teachers = [Teacher(depth, reuse) for depth in (None, *range(len(vector.game.seat.depths))) for reuse in REUSES]
-    tried = sorted(teachers, key=lambda teacher: total_error(vector, teacher, FEW, seed))
-    return min(tried[: -(-len(tried) // 4)], key=lambda teacher: total_error(vector, teacher, MANY, seed))
+    tried = sorted(teachers_of(vector), key=lambda teacher: total_error(vector, teacher, FEW, seed))
+    best = tried[: -(-len(tried) // 4)]
+    return best[0] if len(best) == 1 else min(best, key=lambda teacher: total_error(vector, teacher, MANY, seed))
 
 
-def total_error(vector: DefendingVectorEnv, teacher: Teacher, games: int, seed: int) -> float:
+def total_error(vector: DefendingVectorEnv, teacher: AnyTeacher, games: int, seed: int) -> float:
     """Sum of the errors of all decisions in ``games`` of every lane, m."""
     vector.reset(seed=seed)
     total = 0.0
@@ -78,7 +112,7 @@ def total_error(vector: DefendingVectorEnv, teacher: Teacher, games: int, seed: 
 
 
 def examples(
-    vector: DefendingVectorEnv, teacher: Teacher, seed: int
+    vector: DefendingVectorEnv, teacher: AnyTeacher, seed: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Observations (n, D) of games that a teacher plays, and its actions (n, 2 + S)."""
     rng = np.random.default_rng(seed)

@@ -7,12 +7,12 @@ import inspect
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Flags, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.navigation.error_model import NUM_INERTIAL
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Decision, Demands, Epoch
 from spoofgym.responses.base import Response, given
-from spoofgym.responses.hypotheses import PullKinds, bank_model, empty_bank, start
+from spoofgym.responses.hypotheses import Bank, BankModel, PullKinds, bank_model, empty_bank, start
 from spoofgym.responses.hypothesis_step import advance
 from spoofgym.responses.solutions import Choice, Solutions, carry_past, choose, look_ahead
 from spoofgym.specification import spell
@@ -149,19 +149,40 @@ class MultipleHypothesis(Response):
         start(self._bank, runs, self._prior, self._kinds)
         self._past[runs] = 0.0
 
-    def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
-        """Let the bank see the fix, and choose."""
+    @property
+    def bank(self) -> Bank:
+        """The hypotheses of every run, as `see` left them."""
+        return self._bank
+
+    @property
+    def model(self) -> BankModel:
+        """The filter of the hypotheses."""
+        return self._model
+
+    @property
+    def rows(self) -> Floats:
+        """From an error to the horizontal position now and a while ahead, (K+1, 4, 15)."""
+        return self._rows
+
+    def see(self, epoch: Epoch, runs: Runs) -> Solutions:
+        """Let the bank see the present fix of some runs; the solutions that a defender can choose, of all runs."""
         view, innovation = epoch.view, epoch.innovation
         assert view is not None
-        n, fix = len(epoch.index), given(epoch)
-        every, auxiliary = np.arange(n), view.auxiliary
+        auxiliary = view.auxiliary
         fixes = innovation.residual + np.einsum(
             "nmi,ni->nm", self._model.observation[epoch.index, 0, :, :NUM_INERTIAL], auxiliary
         )
         correction = np.einsum("nmi,nm->ni", view.fix_gain, innovation.whitened)
         solutions = Solutions(auxiliary, correction, self._past, np.minimum(epoch.index, self.history))
+        advance(runs, epoch.index, fixes, given(epoch), self._model, self._kinds, self._bank)
+        carry_past(runs, epoch.index, self._model.transition, view.backtracked, solutions)
+        return solutions
+
+    def decide(self, epoch: Epoch, alarm: Flags) -> Decision:
+        """Let the bank see the fix, and choose."""
+        n = len(epoch.index)
+        every = np.arange(n)
+        solutions = self.see(epoch, every)
         choice = Choice(np.zeros(n, dtype=bool), np.zeros(n, dtype=np.int64), np.zeros(n))
-        advance(every, epoch.index, fixes, fix, self._model, self._kinds, self._bank)
-        carry_past(every, epoch.index, self._model.transition, view.backtracked, solutions)
-        choose(every, epoch.index, fix, self._rows, self._bank, solutions, self.limit, choice)
+        choose(every, epoch.index, given(epoch), self._rows, self._bank, solutions, self.limit, choice)
         return Decision(choice.use, choice.backtrack)

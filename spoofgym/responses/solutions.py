@@ -22,6 +22,8 @@ MOMENTS = 2
 """The error is looked at now and a while ahead."""
 SEEN = 2 * MOMENTS
 """Horizontal positions at these moments."""
+NO_LIMIT = 0.0
+"""In the place of a limit: an error is worth its size, m."""
 SIZE_SHARE = 1e-3
 """What an error as large as the limit is worth beside exceeding it."""
 TINY = 1e-12
@@ -103,7 +105,8 @@ def carry_past(runs: Runs, index: Runs, transition: Floats, backtracked: Runs, s
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _seen(rows: Floats, error: Floats, seen: Floats) -> None:
+def position(rows: Floats, error: Floats, seen: Floats) -> None:
+    """The horizontal positions, now and ahead (4,), of an error (15,)."""
     for a in range(SEEN):
         seen[a] = 0.0
         for j in range(NUM_INERTIAL):
@@ -165,6 +168,18 @@ def _price(square: float, variance: float, limit: float) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def loss_at(moment: int, weight: Floats, means: Floats, variances: Floats, seen: Floats, limit: float) -> float:
+    """What the error of a solution is expected to be worth at one moment, 0 = now, 1 = ahead; as `expected_loss`."""
+    total = 0.0
+    for h in range(len(weight)):
+        if weight[h] > 0.0:
+            east = means[h, 2 * moment] - seen[2 * moment]
+            north = means[h, 2 * moment + 1] - seen[2 * moment + 1]
+            total += weight[h] * _price(east * east + north * north, variances[h, moment], limit)
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def expected_loss(weight: Floats, means: Floats, variances: Floats, seen: Floats, limit: float) -> float:
     """What the error of a solution is expected to be worth, mean of both moments.
 
@@ -176,13 +191,31 @@ def expected_loss(weight: Floats, means: Floats, variances: Floats, seen: Floats
         limit: that an error shall not exceed, m; 0 = an error is worth its size, m.
     """
     total = 0.0
-    for h in range(len(weight)):
-        if weight[h] > 0.0:
-            for moment in range(MOMENTS):
-                east = means[h, 2 * moment] - seen[2 * moment]
-                north = means[h, 2 * moment + 1] - seen[2 * moment + 1]
-                total += weight[h] * _price(east * east + north * north, variances[h, moment], limit)
+    for moment in range(MOMENTS):
+        total += loss_at(moment, weight, means, variances, seen, limit)
     return total / MOMENTS
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def weigh_positions(
+    looked: Floats, run: int, bank: Bank, weight: Floats, means: Floats, variances: Floats
+) -> None:
+    """Fill the probabilities of a run's hypotheses, and where they see the unaided solution's error.
+
+    Args:
+        looked: rows of `look_ahead` at the run's epoch, (4, 15).
+        run: which.
+        bank: the hypotheses.
+        weight: (M,), filled.
+        means: (M, 4), m, filled.
+        variances: (M, 2), m², filled.
+    """
+    for h in range(len(weight)):
+        weight[h] = np.exp(bank.log_weight[run, h])
+        if weight[h] > 0.0:
+            position(looked, bank.mean[run, h], means[h])
+            for moment in range(MOMENTS):
+                variances[h, moment] = _variance(looked[2 * moment :], bank.covariance[run, h])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -213,22 +246,17 @@ def choose(
     seen, used = np.empty(SEEN), np.empty(NUM_INERTIAL)
     for run in runs:
         looked = rows[index[run]]
-        for h in range(hypotheses):
-            weight[h] = np.exp(bank.log_weight[run, h])
-            if weight[h] > 0.0:
-                _seen(looked, bank.mean[run, h], means[h])
-                for moment in range(MOMENTS):
-                    variances[h, moment] = _variance(looked[2 * moment :], bank.covariance[run, h])
+        weigh_positions(looked, run, bank, weight, means, variances)
         best = np.inf
         choice.use[run], choice.backtrack[run] = False, 0
         if available[run]:
             for j in range(NUM_INERTIAL):
                 used[j] = solutions.filter[run, j] + solutions.correction[run, j]
-            _seen(looked, used, seen)
+            position(looked, used, seen)
             best = expected_loss(weight, means, variances, seen, limit)
             choice.use[run] = True
         for n in range(min(solutions.reach[run], solutions.past.shape[1] - 1) + 1):
-            _seen(looked, solutions.past[run, n], seen)
+            position(looked, solutions.past[run, n], seen)
             loss = expected_loss(weight, means, variances, seen, limit)
             if loss < best - 1e-9:
                 best = loss

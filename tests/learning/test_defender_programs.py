@@ -9,9 +9,11 @@ import pytest
 from spoofgym.calibration import calibrated_all
 from spoofgym.detectors import make_detector
 from spoofgym.envs.trained import defender_config
+from spoofgym.envs.vector import DefenderVectorEnv
 from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.learning import defender
 from spoofgym.learning.defender import VALIDATION_FILE, VALIDATION_SEED
+from spoofgym.learning.imitation import BankTeacher
 from spoofgym.learning.run_folder import CHECKPOINT_FILE
 from spoofgym.policies.learned import CONFIG_FILE, POLICY_FILE, LearnedDefender
 from spoofgym.scenarios import make_scenario
@@ -108,6 +110,30 @@ def test_a_run_that_was_interrupted_at_its_beginning_starts_again(taught, tmp_pa
         assert (folder / name).read_bytes() == (taught / name).read_bytes()
 
 
+def test_a_defender_that_sees_a_bank_begins_with_what_it_says(tmp_path):
+    """The policy that is kept plays again without the program, and the network does what its teacher does.
+
+    The teacher excludes in some hundreds of the decisions: who never does would agree in nine of ten at most.
+    """
+    folder, bank = tmp_path / "bank", "multiple-hypothesis:hypotheses=4,hidden=0"
+    given = [*SHORT, "--bank", bank, "--steps", str(STEPS), "--hidden", "32"]
+    assert defender.main([*given, "--out", str(folder)]) == 0
+    policy = LearnedDefender.load(folder)
+    config = defender_config(policy)
+    assert config.bank == bank
+    assert policy.layout[-1] == "spread of the hypotheses"
+    vector = DefenderVectorEnv(64, **(vars(config) | {"clean": 0.0, "attacks": "random-jump"}))
+    observation, _ = vector.reset(seed=9)
+    same, excluded = [], []
+    for _ in range(59):
+        taught = BankTeacher(0.1).act(vector.game)
+        same.append(policy.act(observation)[:, 0] == taught[:, 0])
+        excluded.append(taught[:, 0] == 1)
+        observation, *_ = vector.step(taught)
+    assert np.mean(excluded) > 0.1
+    assert np.mean(same) > 0.93
+
+
 # --- arguments ---------------------------------------------------------------------------------------------
 
 
@@ -119,6 +145,8 @@ def test_a_run_that_was_interrupted_at_its_beginning_starts_again(taught, tmp_pa
         (defender, ["--detector", "snapshot", "--attacks", "rain"], "unknown attack 'rain'; valid names: "),
         (defender, ["--detector", "snapshot", "--detector", "snapshot"], "each detector can be given once only"),
         (defender, ["--scenario", "foi-drive:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
+        (defender, ["--bank", "exclude"], "bank: a bank is spelled multiple-hypothesis or multiple-hypothesis:"),
+        (defender, ["--bank", "multiple-hypothesis", "--spoofer", "jump"], "nobody sees a bank in a duel"),
         (defender, ["--resume", "--out", "nowhere"], "nowhere holds no run to resume: it has no config.json"),
         (tune, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: "),
     ],
