@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from spoofgym.report.figures import Bar, Bars, Figure, Mark, Section
-from spoofgym.report.tables import Report, facts_of, interval_of, table_of
+from spoofgym.report.tables import Report, counted, facts_of, interval_of, table_of
 
 
 def benchmark_sections(report: Report) -> list[Section]:
@@ -27,7 +27,7 @@ def benchmark_sections(report: Report) -> list[Section]:
         ),
         Bars(
             title="Normalised score by task",
-            summary=f"{len(tasks)} tasks; {len(report['refused'])} do not fit and are left out.",
+            summary=f"{counted(len(tasks), 'task')}; {len(report['refused'])} that do not fit are left out.",
             unit="normalised score (95 % interval)",
             bars=[_task(task) for task in tasks],
             marks=[Mark("reference", 1.0)],

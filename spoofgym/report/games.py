@@ -12,7 +12,7 @@ def game_section(game: GameTrace) -> Section:
     """A game, who played it and with which seed, and its story."""
     players = game.players
     detectors = "; ".join(
-        f"{part.name} above {part.threshold:.4g}" + ("" if part.arl0 is None else f" (ARL₀ {part.arl0:.3g} epochs)")
+        f"{part.name} above {part.threshold:.4g}" + ("" if part.arl0 is None else f" (one false alarm in {part.arl0:,.0f} epochs)")
         for part in game.statistics
     )
     attack = players.attack or "nobody"

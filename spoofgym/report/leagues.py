@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from spoofgym.report.figures import Bar, Bars, Figure, Layer, Line, Lines, Matrix, Section
-from spoofgym.report.tables import Report, facts_of, interval_of, table_of
+from spoofgym.report.tables import Report, counted, facts_of, interval_of, table_of
 
 SIDES = ("spoofer", "defender")
 
@@ -40,7 +40,8 @@ def _values(rounds: Sequence[Report], payoff: str) -> Lines:
     last, (low, high) = rounds[-1], intervals[-1]
     return Lines(
         title="Value of the game by round",
-        summary=f"After {len(rounds)} rounds the value is {last['value']:.3g} [{low:.3g}, {high:.3g}] ({payoff}).",
+        summary=f"After {counted(len(rounds), 'round')} the value is {last['value']:.3g} [{low:.3g}, {high:.3g}] "
+        f"({payoff}).",
         x_label="round",
         y_label=payoff,
         x=[found["number"] for found in rounds],
@@ -63,8 +64,8 @@ def _matrix(rounds: Sequence[Report], payoff: str) -> Matrix:
     spoofers, defenders = _names(rounds, "spoofer"), _names(rounds, "defender")
     return Matrix(
         title="Payoff matrix",
-        summary=f"Mean {payoff} of every spoofer (rows) against every defender (columns), with the share of each in "
-        "the mixture of its side. The round can be chosen.",
+        summary=f"Mean payoff ({payoff}) of every spoofer (rows) against every defender (columns), with the share of "
+        "each in the mixture of its side. The round can be chosen.",
         corner="spoofer",
         rows=[short(name) for name in spoofers],
         columns=[short(name) for name in defenders],
@@ -145,7 +146,7 @@ def _worst(last: Report, payoff: str) -> Bars:
     return Bars(
         title="Worst case of every defender",
         summary=f"{bars[0].label} has the least worst case, {bars[0].value:.3g} ({payoff}).",
-        unit=f"largest mean {payoff} against it in the last round (95 % interval)",
+        unit=f"worst case in the last round: {payoff} (95 % interval)",
         bars=bars,
     )
 

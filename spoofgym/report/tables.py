@@ -35,7 +35,7 @@ def plain_section(report: Report) -> list[Section]:
     about = next((str(report[name]) for name in ("paper", "scenario", "log", "benchmark") if name in report), "")
     title = _capital(str(report["kind"])) + (f": {about}" if about else "")
     sort = "A click on the name of a column sorts them."
-    tables = [table_of(_capital(name), f"{len(rows)} rows. {sort}", rows) for name, rows in lists.items()]
+    tables = [table_of(_capital(name), f"{counted(len(rows), 'row')}. {sort}", rows) for name, rows in lists.items()]
     return [Section(title, facts_of(report), tables)]
 
 
@@ -71,6 +71,11 @@ def interval_of(row: Mapping[str, Any], name: str = "ci95") -> tuple[float | Non
     """The ends of an interval; None where there is none."""
     low, high = row.get(name) or (None, None)
     return low, high
+
+
+def counted(number: int, what: str) -> str:
+    """So many of something: 1 row, 2 rows."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def percent(share: float | None) -> float | None:

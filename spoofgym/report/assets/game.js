@@ -2,16 +2,16 @@
 "use strict";
 
 (() => {
-  /** How each kind of event is marked: by a shape and by the dashes of its line. */
+  /** How each kind of event is marked: by a shape, as a character where canvases are drawn, and by the dashes of its line. */
   page.eventKinds = {
-    onset: { shape: "diamond", dash: [] },
-    "end of the attack": { shape: "square", dash: [10, 4] },
-    alarm: { shape: "triangle", dash: [6, 3] },
-    exclusion: { shape: "cross", dash: [2, 3] },
-    backtrack: { shape: "back", dash: [8, 3, 2, 3] },
-    "re-use": { shape: "circle", dash: [4, 4] },
-    reset: { shape: "down", dash: [1, 3] },
-    divergence: { shape: "cross", dash: [] },
+    onset: { shape: "diamond", glyph: "◆", dash: [] },
+    "end of the attack": { shape: "square", glyph: "■", dash: [10, 4] },
+    alarm: { shape: "triangle", glyph: "▲", dash: [6, 3] },
+    exclusion: { shape: "cross", glyph: "✕", dash: [2, 3] },
+    backtrack: { shape: "back", glyph: "◀", dash: [8, 3, 2, 3] },
+    "re-use": { shape: "circle", glyph: "●", dash: [4, 4] },
+    reset: { shape: "down", glyph: "▼", dash: [1, 3] },
+    divergence: { shape: "cross", glyph: "✕", dash: [] },
   };
   const CHIPS = 14;
   const AXES = ["east", "north", "up"];

@@ -3,6 +3,7 @@
 
 (() => {
   const HEIGHT = 300;
+  const FEW = 12; // points at which intervals are drawn one by one
   const faded = (colour) => `${colour}33`;
 
   function colours(figure) {
@@ -20,6 +21,26 @@
     return [low >= 0 && low < 0.4 * high ? 0 : low - room, high + room];
   }
 
+  /** Intervals at single points, where a band would be hard to read. */
+  function drawWhiskers(present, figure, styles) {
+    const { ctx } = present;
+    ctx.save();
+    ctx.lineWidth = 2 * devicePixelRatio;
+    figure.lines.forEach((line, place) => {
+      if (line.low === null) return;
+      ctx.strokeStyle = styles[place].colour;
+      figure.x.forEach((x, k) => {
+        if (line.low[k] === null || line.high[k] === null) return;
+        const across = present.valToPos(x, "x", true) + 5 * place * devicePixelRatio;
+        ctx.beginPath();
+        ctx.moveTo(across, present.valToPos(line.low[k], "y", true));
+        ctx.lineTo(across, present.valToPos(line.high[k], "y", true));
+        ctx.stroke();
+      });
+    });
+    ctx.restore();
+  }
+
   page.figures.lines = (node, figure) => {
     const sheet = page.element("div");
     const legend = page.element("div");
@@ -29,7 +50,7 @@
       if (plot) plot.destroy();
       const styles = colours(figure);
       const ends = [figure.x[0], figure.x[figure.x.length - 1]];
-      const room = ends[0] === ends[1] ? 1 : 0;
+      const room = ends[0] === ends[1] ? 0.5 : 0;
       const options = page.plotOptions(page.width(sheet), HEIGHT, { xLabel: figure.x_label, xRange: [ends[0] - room, ends[1] + room], scale: { range: span(figure) }, whole: figure.whole });
       options.axes[0].values = (_, marks) => marks.map((mark) => page.compact(mark));
       const data = [figure.x];
@@ -44,6 +65,7 @@
         }
         options.bands.push({ series: [data.length - 2, data.length - 1], fill: faded(styles[place].colour) });
       });
+      if (figure.x.length <= FEW) options.hooks.draw = [(present) => drawWhiskers(present, figure, styles)];
       sheet.replaceChildren();
       plot = new uPlot(options, data, sheet);
       legend.replaceChildren(page.legend(figure.lines.map((line, place) => ({ name: line.name, ...styles[place] }))), page.element("div", { class: "legend" }, figure.y_label));

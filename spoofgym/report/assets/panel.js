@@ -73,6 +73,24 @@
     plot.ctx.restore();
   }
 
+  /** The lines of the events, with their marks at the top; those of one epoch stand below each other. */
+  function drawEvents(plot, game, marked) {
+    const { ctx, bbox } = plot;
+    const size = 11 * devicePixelRatio;
+    game.firsts.forEach((event, place) => {
+      const { dash, glyph } = page.eventKinds[event.kind];
+      page.plotRule(plot, "x", game.time[event.epoch], page.colour("event"), dash, 1);
+      if (!marked) return;
+      const above = game.firsts.slice(0, place).filter((other) => other.epoch === event.epoch).length;
+      ctx.save();
+      ctx.font = `${size}px system-ui, sans-serif`;
+      ctx.fillStyle = page.colour("event");
+      [ctx.textBaseline, ctx.textAlign] = ["top", "left"];
+      ctx.fillText(glyph, plot.valToPos(game.time[event.epoch], "x", true) + 3 * devicePixelRatio, bbox.top + (2 * devicePixelRatio + size) * above);
+      ctx.restore();
+    });
+  }
+
   /** Makes a panel; it redraws itself when its width or the theme changes. */
   page.panel = (state, options) => {
     const { game } = state;
@@ -92,7 +110,7 @@
       made.hooks.draw = [
         (present) => {
           for (const rule of options.rules || []) page.plotRule(present, "y", rule.value, page.colour(rule.colour), rule.dash, 1.5);
-          for (const event of game.firsts) page.plotRule(present, "x", game.time[event.epoch], page.colour("event"), page.eventKinds[event.kind].dash, 1);
+          drawEvents(present, game, !options.last); // the rows of the last panel would hide the marks
           if (options.draw) options.draw(present);
           if (present === plot) move(state.index); // the scales are known now
         },
@@ -107,7 +125,10 @@
 
     function listen(over) {
       const go = (event) => state.go(plot.posToIdx(event.clientX - over.getBoundingClientRect().left));
-      over.addEventListener("pointerdown", go);
+      over.addEventListener("pointerdown", (event) => {
+        go(event);
+        state.focus(); // so that the keys go on from there
+      });
       over.addEventListener("pointermove", (event) => {
         if (event.buttons === 1) go(event);
       });

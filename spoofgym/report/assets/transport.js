@@ -11,6 +11,7 @@
     let timer = null;
     let speed = 1;
     const slider = page.element("input", { type: "range", min: 0, max: last, step: 1, value: 0, "aria-label": "Epoch of the game", input: () => state.go(Number(slider.value)) });
+    state.focus = () => slider.focus({ preventScroll: true });
     const told = page.element("output");
     const play = page.element("button", { type: "button", class: "play", click: () => (timer === null ? start() : stop()) }, "Play");
     const step = (label, text, move) => page.element("button", { type: "button", "aria-label": label, title: label, click: move }, text);
