@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from spoofgym.evaluation.game_trace import ALARM, BACKTRACK, EXCLUSION, ONSET, REUSE, GameTrace
+from spoofgym.evaluation.game_trace import ALARM, BACKTRACK, EXCLUSION, ONSET, REUSE, GameTrace, Statistic
 from spoofgym.report.figures import GameFigure, Section
 
 
 def game_section(game: GameTrace) -> Section:
     """A game, who played it and with which seed, and its story."""
     players = game.players
-    detectors = "; ".join(
-        f"{part.name} above {part.threshold:.4g}" + ("" if part.arl0 is None else f" (one false alarm in {part.arl0:,.0f} epochs)")
-        for part in game.statistics
-    )
+    detectors = "; ".join(map(_watching, game.statistics))
     attack = players.attack or "nobody"
     facts = [
         ("Scenario", players.scenario),
@@ -27,6 +24,11 @@ def game_section(game: GameTrace) -> Section:
     title = f"{_spoofer(game)} against {players.response or 'no defender'} on {players.scenario}"
     figure = GameFigure(title="The game, epoch by epoch", summary=game_story(game), game=game.to_json())
     return Section(title, facts, [figure])
+
+
+def _watching(part: Statistic) -> str:
+    rate = "" if part.arl0 is None else f" (one false alarm in {part.arl0:,.0f} epochs)"
+    return f"{part.name} above {part.threshold:.4g}{rate}"
 
 
 def game_story(game: GameTrace) -> str:
