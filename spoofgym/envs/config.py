@@ -10,12 +10,16 @@ from spoofgym import validation
 from spoofgym.attacks.base import KNOWLEDGE, Attack
 from spoofgym.attacks.pool import AttackPool
 from spoofgym.detectors.base import Detector
+from spoofgym.navigation.facts import LINEAR_MODEL
 from spoofgym.navigation.family import COUPLINGS
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios import make_scenario
 
 ACTIONS = ("rate", "innovation")
 ON_ALARM = ("end", "respond")
+RECORDED = "recorded"
+"""Begins the specification of a log."""
 
 DEFENDER_DETECTORS = ("snapshot", "windowed:n=5", "windowed:n=20", "relative-motion:k=20")
 
@@ -66,11 +70,14 @@ def clean_of_pool(name: str) -> Idle:
 def configure(kind: type[Config], arguments: Mapping[str, Any]) -> Config:
     """The configuration that a person asks for by keyword arguments.
 
+    Fidelity and knowledge that are not given choose themselves where the scenario leaves one value: a recorded log has
+    one fidelity, and no linear model, so that its spoofers are blind.
+
     Raises:
         TypeError: an unknown key; the message lists the valid ones.
         ValueError: an argument that has no effect beside the others.
     """
-    config = configuration(kind, arguments)
+    config = configuration(kind, {**_only_possible(kind, arguments), **arguments})
     for idle in kind.idle:  # type: ignore[attr-defined]
         for name in idle.names:
             if name in arguments and idle.where(config, arguments):
@@ -89,6 +96,25 @@ def configuration(kind: type[Config], arguments: Mapping[str, Any]) -> Config:
         if key not in valid:
             raise TypeError(f"unknown argument {key!r}; valid arguments: {', '.join(valid)}")
     return kind(**arguments)
+
+
+def _only_possible(kind: type, arguments: Mapping[str, Any]) -> dict[str, str]:
+    """The values of arguments that are not given, and of which the scenario leaves one."""
+    scenario = arguments.get("scenario")
+    if isinstance(scenario, str) and scenario.strip().startswith(RECORDED):
+        try:
+            scenario = make_scenario(scenario, arguments.get("coupling"))
+        except (ValueError, TypeError):
+            return {}  # the environment says what is wrong
+    if not isinstance(scenario, Scenario):
+        return {}
+    chosen = {}
+    names = [item.name for item in fields(kind)]
+    if "fidelity" in names and len(scenario.fidelities) == 1:
+        chosen["fidelity"] = scenario.fidelities[0]
+    if "knowledge" in names and LINEAR_MODEL not in scenario.offers:
+        chosen["knowledge"] = "blind"
+    return chosen
 
 
 def arguments_of(config: Any) -> dict[str, Any]:
