@@ -10,12 +10,14 @@ import functools
 import json
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
 
 from spoofgym import files
+from spoofgym.patience import programs_are_ours
 
 FAILURE, USAGE, INTERRUPTED, CLOSED_PIPE = 1, 2, 130, 141
 
@@ -36,6 +38,7 @@ def program(main: Callable[[Sequence[str] | None], int | None]) -> Program:
     @functools.wraps(main)
     def entry(arguments: Sequence[str] | None = None) -> int:
         _print_everything()
+        programs_are_ours()
         try:
             try:
                 return main(arguments) or 0
@@ -93,6 +96,20 @@ def moved(new: str) -> int:
 def say(text: str) -> None:
     """One line to stderr, however many the text has."""
     print(" ".join(text.split()), file=sys.stderr, flush=True)
+
+
+@contextmanager
+def kept(show: Callable[[], object]) -> Iterator[None]:
+    """Show what is there already when Ctrl-C ends a piece of work, and go on ending.
+
+    Raises:
+        KeyboardInterrupt: as it came.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        show()
+        raise
 
 
 def do_all(*steps: Callable[[], object]) -> None:

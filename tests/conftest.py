@@ -28,6 +28,8 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = _in_the_test_cache(config) or _temporary(config)
         # thresholds that tests calibrate, never among the user's
         os.environ["SPOOFGYM_CACHE"] = str(folder)
+        # how long something takes on this machine is no part of what programs say
+        os.environ["SPOOFGYM_QUIET"] = "1"
         # a window that a test opens is not on the screen of whoever runs the tests
         os.environ["SDL_VIDEODRIVER"] = "dummy"
         os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(folder / "hypothesis")

@@ -28,6 +28,7 @@ from spoofgym.calibration.clean_statistics import (
 )
 from spoofgym.calibration.first_alarms import FirstAlarms
 from spoofgym.detectors.base import Detector
+from spoofgym.patience import long_work
 from spoofgym.scenario import Scenario
 from spoofgym.validation import written
 
@@ -272,7 +273,8 @@ def calibrated_all(detectors: Sequence[Detector], scenario: Scenario, fidelity: 
             "realisation: give it a threshold"
         )
     missing = {detector.name: detector for detector in wanted if _recall(detector, scenario, fidelity) is None}
-    settings = _find(list(missing.values()), scenario, fidelity) if missing else {}
+    with long_work(f"calibrating {', '.join(missing)}, a minute or more; kept for the next time"):
+        settings = _find(list(missing.values()), scenario, fidelity) if missing else {}
     for name, setting in settings.items():
         _KNOWN[_place(missing[name], scenario, fidelity)] = setting
         if key := _disk_key(missing[name], scenario, fidelity):

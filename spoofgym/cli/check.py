@@ -45,7 +45,10 @@ OPTIONAL = {
     "argcomplete": "completion",
 }
 """By the extra that installs each."""
-VARIABLES = ("SPOOFGYM_CACHE", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT", "OMP_NUM_THREADS", "COLUMNS")
+VARIABLES = (
+    *("SPOOFGYM_CACHE", "SPOOFGYM_QUIET", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT"),
+    *("OMP_NUM_THREADS", "COLUMNS"),
+)
 GOOD, BAD, ABSENT = "ok", "FAILS", "-"
 
 

@@ -25,8 +25,10 @@ from numba.core.serialize import dumps
 from spoofgym.kernels import turns
 from spoofgym.kernels.identity import identity, variant
 from spoofgym.kernels.place import place
+from spoofgym.patience import Compiling
 
 SUFFIX = ".nbc"
+COMPILING = Compiling("compiling kernels for this machine, half a minute or so; the next start finds them compiled")
 UNUSED = 30 * 86400.0
 """Time after which code that no process has loaded is removed, s."""
 
@@ -52,10 +54,14 @@ class KernelStorage(_Cache):
         target_context.refresh()
         file = self._file(sig, target_context.codegen())
         content = None if file is None else _read(file) or turns.take(file, lambda: _read(file))
-        return None if content is None else CompileResult._rebuild(target_context, *pickle.loads(content))
+        if content is None:
+            COMPILING.begin()
+            return None
+        return CompileResult._rebuild(target_context, *pickle.loads(content))
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code for a signature, unless it holds addresses of this process."""
+        COMPILING.end()
         file = self._file(sig, data.codegen)
         if file is None:
             return

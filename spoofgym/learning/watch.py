@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,8 @@ from spoofgym.learning.curve import LearningCurve
 
 CHECKPOINTS = 10
 LONGEST_LEG = 250_000
+LINE_EVERY = 30.0
+"""Seconds between two lines where no bar is shown."""
 
 
 def leg_of(steps: int) -> int:
@@ -69,6 +72,7 @@ class Watch(BaseCallback):
             disable=not console.is_terminal,
         )
         self._task = self._progress.add_task("training", total=steps, result="")
+        self._console, self._begun, self._told = console, time.monotonic(), time.monotonic()
         self._end_of_leg: int | None = None
 
     def start(self) -> None:
@@ -96,9 +100,18 @@ class Watch(BaseCallback):
         played = self.steps_before + self.num_timesteps
         if self.model.ep_info_buffer:
             self._curve.note(self.stream[1], self.num_timesteps, played, mean_return(self.model))
-        self._progress.update(
-            self._task, completed=min(played, self._steps), result=self._result(self.model)  # type: ignore[arg-type]
-        )
+        result = self._result(self.model)  # type: ignore[arg-type]
+        self._progress.update(self._task, completed=min(played, self._steps), result=result)
+        self._tell(played, result)
+
+    def _tell(self, played: int, result: str) -> None:
+        """A line every so often where there is no bar: an output that is no terminal, a file say."""
+        now = time.monotonic()
+        if self._console.is_terminal or now - self._told < LINE_EVERY:
+            return
+        self._told = now
+        spent, share = now - self._begun, min(played / self._steps, 1.0)
+        self._console.print(f"training: {played:,} of {self._steps:,} steps, {share:.0%}, {spent:.0f} s; {result}")
 
     def _on_rollout_start(self) -> None:
         if self._end_of_leg is not None and self.num_timesteps < self._end_of_leg:

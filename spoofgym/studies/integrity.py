@@ -13,22 +13,26 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.table import Table
+from rich.text import Text
 from scipy import special
 
 from spoofgym.arrays import Flags, Floats
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
+from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
 from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.tight.shared_gains import TightNavigator
-from spoofgym.program import give_json, moved, program
+from spoofgym.program import do_all, give_json, kept, moved, program
+from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
@@ -38,16 +42,17 @@ from spoofgym.studies.stanford import draw_side_by_side
 EXAMPLES = (
     "spoofgym integrity --runs 50",
     "spoofgym integrity --figure stanford.png",
+    "spoofgym integrity --scenario foi-drive --climb 0.5 --climb 2 --json -",
 )
 
-HORIZON = 2400
-"""Epochs of half a second: 20 minutes."""
+SCENARIO = "kujur-flight:horizon=2400"
+"""20 minutes."""
+RUNS = 200
 UP = 2
 BATCH = 100
 """Runs that are played at once."""
 SNAPSHOT, BANK, MONITOR = "snapshot:p_fa=1e-5", "separation-bank", "kujur-monitor"
 FROM_P, FROM_P_TESTED = "K σ from P, no test", "K σ from P, snapshot test"
-USERS = (FROM_P, FROM_P_TESTED, BANK, MONITOR)
 
 
 @dataclass(frozen=True)
@@ -103,44 +108,60 @@ def multiplier(p_md: float) -> float:
     return float(-special.ndtri(p_md))
 
 
-def play(replica: Replica, runs: int, seed: int, horizon: int = HORIZON, p_md: float = DEFAULT_P_MD) -> Flight:
+def play(
+    replica: Replica, runs: int, seed: int, scenario: Scenario, p_md: float = DEFAULT_P_MD, threads: int = 1
+) -> Flight:
     """Play a replica; run i is seeded ``seed + i``, whatever the replica.
 
     Args:
         replica: what is replayed, from epoch 1 on.
         runs: N.
         seed: of run 0.
-        horizon: K, epochs of half a second.
+        scenario: whose K epochs are played, in its first fidelity.
         p_md: of every level, to one side.
+        threads: of the simulation.
     """
-    parts = [_play(replica, min(BATCH, runs - first), seed + first, horizon, p_md) for first in range(0, runs, BATCH)]
+    batches = [(min(BATCH, runs - first), seed + first) for first in range(0, runs, BATCH)]
+    parts = [_play(replica, *batch, scenario, p_md, threads) for batch in batches]
     return Flight(
         np.concatenate([part.error for part in parts]),
-        {user: np.concatenate([part.level[user] for part in parts]) for user in USERS},
-        {user: np.concatenate([part.alarm[user] for part in parts]) for user in USERS},
+        {user: np.concatenate([part.level[user] for part in parts]) for user in parts[0].level},
+        {user: np.concatenate([part.alarm[user] for part in parts]) for user in parts[0].alarm},
         parts[0].alert_limit,
     )
 
 
-def _play(replica: Replica, runs: int, seed: int, horizon: int, p_md: float) -> Flight:
-    scenario = make_scenario(f"kujur-flight:horizon={horizon}")
-    assert scenario.alert_limits is not None
-    bank, monitor = make_detector(spell(BANK, p_md=p_md)), make_detector(spell(MONITOR, p_md_ss=p_md))
-    assert isinstance(bank, SeparationBank)
-    assert isinstance(monitor, KujurMonitor)
-    detectors = {FROM_P_TESTED: make_detector(SNAPSHOT), BANK: bank, MONITOR: monitor}
-    simulation = Simulation(scenario, None, list(detectors.values()), None, runs, seed)
+def users_of(scenario: Scenario, p_md: float = DEFAULT_P_MD) -> dict[str, Detector | None]:
+    """The users whose monitors a scenario offers what they need, each with its detector; None = it has no test."""
+    monitors = {
+        FROM_P_TESTED: make_detector(SNAPSHOT),
+        BANK: make_detector(spell(BANK, p_md=p_md)),
+        MONITOR: make_detector(spell(MONITOR, p_md_ss=p_md)),
+    }
+    fitting = {user: each for user, each in monitors.items() if set(each.needs) <= set(scenario.offers)}
+    return {FROM_P: None, **fitting}
+
+
+def _play(replica: Replica, runs: int, seed: int, scenario: Scenario, p_md: float, threads: int) -> Flight:
+    users = users_of(scenario, p_md)
+    detectors = {user: detector for user, detector in users.items() if detector is not None}
+    fidelity = scenario.fidelities[0]
+    simulation = Simulation(
+        scenario, None, list(detectors.values()), None, runs, seed, fidelity=fidelity, threads=threads
+    )
     simulation.reset()
     simulation.resolve()
+    horizon = scenario.timeline.num_epochs
     offset, error = offsets(replica, simulation, horizon), np.empty((runs, horizon))
-    level = {user: np.empty((runs, horizon)) for user in USERS}
-    alarm = {user: np.zeros((runs, horizon), dtype=bool) for user in USERS}
+    level = {user: np.empty((runs, horizon)) for user in users}
+    alarm = {user: np.zeros((runs, horizon), dtype=bool) for user in users}
     for k in range(horizon):
         epoch = simulation.observe(offset[k])
         for user, detector in detectors.items():
             assert detector.threshold is not None
             alarm[user][:, k] = epoch.statistics[detector.name] > detector.threshold
-        level[BANK][:, k], level[MONITOR][:, k] = bank.protection_level, monitor.protection_level
+            if isinstance(detector, SeparationBank | KujurMonitor):
+                level[user][:, k] = detector.protection_level
         level[FROM_P][:, k] = multiplier(p_md) * filtered_sigma(simulation)
         simulation.resolve()
         error[:, k] = simulation.error[:, UP]
@@ -161,23 +182,49 @@ def offsets(replica: Replica, simulation: Simulation, horizon: int) -> Floats:
 
 
 def filtered_sigma(simulation: Simulation) -> Floats:
-    """The filter's own σ of the height after the ranges of the present epoch, (N,), m."""
-    navigator = simulation.navigator
-    assert isinstance(navigator, TightNavigator)
-    prior, gain = navigator.position_covariance[:, UP, UP], navigator.position_gain[:, :, UP]
-    return np.sqrt(prior - (gain**2).sum(axis=1))
+    """The filter's own σ of the height after the fix or the ranges of the present epoch, (N,), m.
+
+    Of a fix with velocity the position alone is counted, which makes it a little larger.
+    """
+    navigator, innovation = simulation.navigator, simulation.epoch.innovation
+    covariance = navigator.position_covariance
+    prior = covariance[:, UP, UP]
+    if isinstance(navigator, TightNavigator):
+        return np.sqrt(prior - (navigator.position_gain[:, :, UP] ** 2).sum(axis=1))
+    used = np.ones(len(prior)) if simulation.epoch.available is None else simulation.epoch.available.astype(float)
+    of_height = covariance[:, :, UP]
+    gained = np.linalg.solve(innovation.covariance[:, :3, :3], of_height[..., None])[..., 0]
+    return np.sqrt(prior - used * (of_height * gained).sum(axis=1))
 
 
-def row(replica: Replica, user: str, result: Integrity, level: Floats) -> str:
-    """One line of the table."""
-    misled, failed = (
-        f"{part.share:.3g} [{part.interval[0]:.2g}, {part.interval[1]:.2g}]" for part in (result.misled, result.failed)
+def table_of(report: dict[str, Any]) -> Table:
+    """An ``"integrity"`` report for the terminal."""
+    games = f"{report['epochs']} epochs, {report['runs']} runs from seed {report['seed']}"
+    title = f"{report['scenario']}, {games}, vertical"
+    table = Table(
+        title=title,
+        caption="misled: share of runs with |error| > level at an epoch without an alarm; failed: with |error| > alert "
+        "limit; 95 % intervals; available, alarm: shares of epochs",
+        box=None,
+        padding=(0, 1, 0, 0),
     )
-    alarmed = result.alarmed / level.size
-    return (
-        f"| {replica.words} | {user} | {np.median(level):.1f} | {misled} | {failed} | {result.availability:.3g} "
-        f"| {alarmed:.3g} |"
-    )
+    table.add_column("level and alarm", overflow="fold")
+    for name in ("level, m", "misled", "failed", "available", "alarm"):
+        table.add_column(name, justify="right", no_wrap=True)
+    signals = ""
+    for row in report["rows"]:
+        if row["signals"] != signals:
+            signals = row["signals"]
+            table.add_row(Text(signals, style="bold"))
+        shares = (row["misleading_information"], row["integrity_failure"])
+        table.add_row(
+            f"  {row['user']}",
+            f"{row['level_m']:.1f}",
+            *(f"{part['share']:.3g} [{part['ci95'][0]:.2g}, {part['ci95'][1]:.2g}]" for part in shares),
+            f"{row['availability']:.3g}",
+            f"{row['epochs_in_alarm'] / (report['epochs'] * report['runs']):.3g}",
+        )
+    return table
 
 
 def draw(flight: Flight, replica: Replica, path: Path) -> None:
@@ -187,7 +234,8 @@ def draw(flight: Flight, replica: Replica, path: Path) -> None:
         ImportError: matplotlib is missing.
     """
     titles = {FROM_P: "K σ from P, no test", BANK: "separation-bank, until its alarm"}
-    diagrams = {title: flight.result(user).diagram for user, title in titles.items()}
+    titles |= {} if BANK in flight.level else {FROM_P_TESTED: "K σ from P, until an alarm of the snapshot test"}
+    diagrams = {title: flight.result(user).diagram for user, title in titles.items() if user in flight.level}
     draw_side_by_side(diagrams, path, f"Replica of the true signals that climbs at {replica.words}: vertical error")
 
 
@@ -198,39 +246,61 @@ def parser() -> argparse.ArgumentParser:
         description="Compare protection levels from P and from solution separation, clean and spoofed.",
         examples=EXAMPLES,
     )
-    result.add_argument("--runs", type=count, default=200, help="of each replica (default: %(default)s)")
+    add = result.add_argument
+    add("--scenario", default=SCENARIO, help="what is driven or flown; a recorded log, too (default: %(default)s)")
+    add("--climb", action="append", type=rate, metavar="M/S",
+        help="of the replayed place; repeatable (default: 0.2, and 0.04 with and without a tracking error)")
+    add("--runs", type=count, help="of each replica (default: 200; a recorded log has one)")
     add_seed(result, "run 0")
+    add_threads(result)
+    add_import(result)
     add_json(result)
     add_figure(result)
     return result
+
+
+def rate(text: str) -> float:
+    """A rate of 0 or more, m/s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < np.inf:
+        raise argparse.ArgumentTypeError(f"expected a rate of 0 m/s or more, got {text!r}")
+    return value
 
 
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    tell = partial(print, file=sys.stderr if options.json == STDOUT else sys.stdout, flush=True)
-    tell(f"kujur-flight, {HORIZON} epochs, {options.runs} runs from seed {options.seed}, vertical\n")
-    tell("| signals | level and alarm | level, m | misleading information | integrity failure | available | in alarm |")
-    tell("|---|---|---|---|---|---|---|")
-    rows = []
-    for replica in REPLICAS:
-        flight = play(replica, options.runs, options.seed, HORIZON)
-        for user in USERS:
-            result, level = flight.result(user), flight.level[user]
-            tell(row(replica, user, result, level))
-            named = {"signals": replica.words, "user": user, "level_m": float(np.median(level))}
-            rows.append({**named, **result.content()})
-        if replica == SLOW and options.figure is not None:
-            draw(flight, replica, options.figure)
-    give_json(report(rows, options.runs, options.seed), options.json)
+    scenario = make_scenario(options.scenario)
+    if not scenario.random and options.runs not in (None, 1):
+        raise ValueError(f"{scenario.name} is a recorded log, which has one run: leave --runs out")
+    runs = options.runs or (RUNS if scenario.random else 1)
+    replicas = REPLICAS if options.climb is None else (CLEAN, *map(Replica, options.climb))
+    drawn = SLOW if options.climb is None else replicas[-1]
+    terminal = console(stderr=options.json == STDOUT)
+    rows: list[dict[str, Any]] = []
+    with kept(lambda: show(terminal, table_of(report(scenario, rows, runs, options.seed)))):
+        for replica in replicas:
+            with terminal.status(replica.words):
+                flight = play(replica, runs, options.seed, scenario, threads=options.threads)
+            for user, level in flight.level.items():
+                named = {"signals": replica.words, "user": user, "level_m": float(np.median(level))}
+                rows.append({**named, **flight.result(user).content()})
+            if replica == drawn and options.figure is not None:
+                draw(flight, replica, options.figure)
+    found = report(scenario, rows, runs, options.seed)
+    do_all(lambda: show(terminal, table_of(found)), lambda: give_json(found, options.json))
     return 0
 
 
-def report(rows: list[dict[str, Any]], runs: int, seed: int) -> dict[str, Any]:
+def report(scenario: Scenario, rows: list[dict[str, Any]], runs: int, seed: int) -> dict[str, Any]:
     """An ``"integrity"`` report.
 
     Args:
+        scenario: that was played.
         rows: of all signals and users.
         runs: of each replica.
         seed: of run 0.
@@ -238,9 +308,9 @@ def report(rows: list[dict[str, Any]], runs: int, seed: int) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "kind": "integrity",
-        "scenario": "kujur-flight",
+        "scenario": scenario.name,
         "direction": "vertical",
-        "epochs": HORIZON,
+        "epochs": scenario.timeline.num_epochs,
         "runs": runs,
         "seed": seed,
         "rows": rows,
