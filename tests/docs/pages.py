@@ -4,7 +4,7 @@ A comment before a block tells the test what to do with it; a reader does not se
 
     <!-- test: replace 400_000 by 2_000 -->     a long training with small numbers; its printed numbers are not compared
     <!-- test: needs ray -->                    skipped where this package is not installed
-    <!-- test: needs the logs -->               skipped where the sample logs are not beside the checkout
+    <!-- test: needs a RINEX file -->           always skipped: the repository has none
 """
 
 from __future__ import annotations
