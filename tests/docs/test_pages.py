@@ -91,8 +91,13 @@ def check_command(words: list[str], line: str) -> None:
     found = find(words)
     assert found is not None, f"no such command: {line}"
     command, length = found
+    parser, rest = command.parser(), words[length:]
+    if "--import" in rest:  # the module is the reader's
+        assert "--import" in parser.format_help(), line
+        place = rest.index("--import")
+        rest = rest[:place] + rest[place + 2 :]
     try:
-        command.parser().parse_args(words[length:])
+        parser.parse_args(rest)
     except SystemExit as error:
         pytest.fail(f"{line}: {error}")
 
