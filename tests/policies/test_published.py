@@ -57,12 +57,12 @@ def test_the_agents_of_this_version_can_play() -> None:
     for name in names:
         policy = load_policy(published_folder(name))
         assert policy.name == name
-        config = {"scenario": policy.configuration["scenario"], "detectors": "snapshot"}
+        detectors = tuple(policy.configuration.get("detectors", ["snapshot"]))
+        config = {"scenario": policy.configuration["scenario"], "detectors": detectors}
         if policy.kind == SPOOFER:
             env = DuelDefenderVectorEnv(2, spoofer=f"policy:{name}", **config)
         else:
-            detectors = tuple(policy.configuration["detectors"])
-            env = DuelSpooferVectorEnv(2, defender=f"policy:{name}", **{**config, "detectors": detectors})
+            env = DuelSpooferVectorEnv(2, defender=f"policy:{name}", **config)
         env.reset(seed=1)
         env.step(env.action_space.sample())
 
