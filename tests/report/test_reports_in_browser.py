@@ -4,7 +4,20 @@ from pathlib import Path
 
 import pytest
 
-from spoofgym.report.page import write_page
+from spoofgym.report.figures import (
+    Bar,
+    Bars,
+    Curve,
+    Curves,
+    Layer,
+    Line,
+    Lines,
+    Matrix,
+    Section,
+    Stanford,
+    TableFigure,
+)
+from spoofgym.report.page import page, write_page
 from tests.report.browser import DESK, PHONE, Browser
 from tests.report.reports import REPORTS, matrix
 from tests.report.test_reports import run
@@ -13,7 +26,7 @@ pytestmark = pytest.mark.xdist_group("browser")
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def all_kinds(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reports")
     runs = [run(folder / f"seed{seed}", seed, [1.0 + seed, 2.0, 3.0]) for seed in range(2)]
     write_page(folder / "all.html", [*(make() for make in REPORTS.values()), *runs], "Everything")
@@ -21,8 +34,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("size", "theme"), [(PHONE, "dark"), (DESK, "light")], ids=["phone-dark", "desk-light"])
-def test_all_figures_draw(page: Path, browser: Browser, size: tuple, theme: str) -> None:
-    browser.open(page, size, theme)
+def test_all_figures_draw(all_kinds: Path, browser: Browser, size: tuple, theme: str) -> None:
+    browser.open(all_kinds, size, theme)
     assert browser.errors() == []
     assert browser.undrawn() == []
     assert browser.blank() == 0
@@ -34,6 +47,26 @@ def test_all_figures_draw(page: Path, browser: Browser, size: tuple, theme: str)
     assert browser.errors() == []
     assert browser.blank() == 0
     browser.find("#theme").send_keys("as the system")
+
+
+def test_figures_without_any_number_draw(browser: Browser, tmp_path: Path) -> None:
+    nothing = [[None, None], [None, None]]
+    cells = {"corner": "row", "rows": ["a", "b"], "columns": ["c", "d"]}
+    empty = [
+        Bars(title="a", summary="", unit="m", bars=[Bar("x", None)]),
+        Bars(title="b", summary="", unit="m", bars=[Bar("x", 0.0)], logarithmic=True),
+        Matrix(title="c", summary="", layers=[Layer("m", nothing), Layer("n", nothing, logarithmic=True)], **cells),
+        Lines(title="d", summary="", x_label="x", y_label="y", x=[0], lines=[Line("l", [None], [None], [None])]),
+        Curves(title="e", summary="", curves=[Curve("d", "a", [], [], [], [])], chosen="a"),
+        Stanford(title="f", summary="", alert_limit=1.0, edges=[0.0, 1.0, 1.5], cells=[], regions=[("nominal", 0)]),
+        TableFigure(title="g", summary="", columns=["x"], rows=[]),
+    ]
+    (tmp_path / "empty.html").write_text(page([Section("empty", [], empty)], "empty"), encoding="utf-8")
+    browser.open(tmp_path / "empty.html")
+    assert browser.errors() == []
+    assert browser.undrawn() == []
+    browser.find("figure.matrix select").send_keys("n")
+    assert browser.errors() == []
 
 
 def column(browser: Browser) -> list[float]:

@@ -20,7 +20,7 @@
     const known = ends.filter((value) => value !== null);
     if (figure.logarithmic) {
       const positive = known.filter((value) => value > 0);
-      return [0.85 * Math.min(...positive), 1.15 * Math.max(...positive)];
+      return positive.length ? [0.85 * Math.min(...positive), 1.15 * Math.max(...positive)] : [0.1, 1];
     }
     const low = Math.min(0, ...known);
     const high = Math.max(0, ...known);

@@ -16,7 +16,7 @@
 
   function span(figure) {
     const known = figure.lines.flatMap((line) => [line.y, line.low || [], line.high || []].flat()).filter((value) => value !== null);
-    const [low, high] = [Math.min(...known), Math.max(...known)];
+    const [low, high] = known.length ? [Math.min(...known), Math.max(...known)] : [0, 1];
     const room = 0.06 * (high - low || Math.abs(high) || 1);
     return [low >= 0 && low < 0.4 * high ? 0 : low - room, high + room];
   }

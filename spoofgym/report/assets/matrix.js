@@ -19,6 +19,7 @@
     const known = layer.values.flat().filter((value) => value !== null);
     if (layer.logarithmic) {
       const positive = known.filter((value) => value > 0);
+      if (!positive.length) return () => 0;
       const [low, high] = [Math.log(Math.max(Math.min(...positive), 1e-3 * Math.max(...positive))), Math.log(Math.max(...positive))];
       return (value) => (value <= 0 ? 0 : Math.min(Math.max((Math.log(value) - low) / (high - low || 1), 0), 1));
     }
