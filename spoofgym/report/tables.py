@@ -33,9 +33,9 @@ def plain_section(report: Report) -> list[Section]:
     if not lists:
         raise ValueError("it has no rows")
     about = next((str(report[name]) for name in ("paper", "scenario", "log", "benchmark") if name in report), "")
-    title = _capital(str(report["kind"])) + (f": {about}" if about else "")
+    title = capital(str(report["kind"])) + (f": {about}" if about else "")
     sort = "A click on the name of a column sorts them."
-    tables = [table_of(_capital(name), f"{counted(len(rows), 'row')}. {sort}", rows) for name, rows in lists.items()]
+    tables = [table_of(capital(name), f"{counted(len(rows), 'row')}. {sort}", rows) for name, rows in lists.items()]
     return [Section(title, facts_of(report), tables)]
 
 
@@ -43,7 +43,8 @@ def _are_rows(value: object) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
 
 
-def _capital(name: str) -> str:
+def capital(name: str) -> str:
+    """The name of a value as words."""
     words = name.replace("-", " ").replace("_", " ")
     return words[:1].upper() + words[1:]
 
@@ -55,7 +56,7 @@ def facts_of(report: Report) -> list[tuple[str, str]]:
         if name in UNTOLD or not isinstance(value, str | int | float | bool):
             continue
         text = ("yes" if value else "no") if isinstance(value, bool) else _written(value)
-        facts.append((NAMES.get(name, _capital(name)), text))
+        facts.append((NAMES.get(name, capital(name)), text))
     detector = report.get("detector")
     if isinstance(detector, Mapping):
         threshold = "" if detector["threshold"] is None else f" above {detector['threshold']:.4g}"

@@ -23,6 +23,7 @@ from spoofgym.evaluation.learning_curve import (
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.policies.learned import CONFIG_FILE, kind_of, read_config
 from spoofgym.report.figures import Figure, Line, Lines, Section
+from spoofgym.report.tables import capital
 
 MOST_POINTS = 400
 """Of a curve in a page."""
@@ -92,7 +93,8 @@ def _section(runs: Sequence[TrainingRun]) -> Section:
             figures.append(_lines(title, y_label, found, key))
     seeds = ", ".join(str(run.seed) for run in runs)
     facts = [("Runs", ", ".join(run.name for run in runs)), ("Seeds", seeds)]
-    facts += [(name.capitalize(), _told(value)) for name, value in environment.items() if value is not None]
+    told = {name: value for name, value in environment.items() if value is not None and name != "threads"}
+    facts += [(capital(name), _told(value)) for name, value in told.items()]
     return Section(f"Training of a {kind_of(environment)} on {environment['scenario']}", facts, figures)
 
 

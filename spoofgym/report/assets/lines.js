@@ -50,7 +50,8 @@
       if (plot) plot.destroy();
       const styles = colours(figure);
       const ends = [figure.x[0], figure.x[figure.x.length - 1]];
-      const room = ends[0] === ends[1] ? 0.5 : 0;
+      const alone = figure.whole ? 0.5 : Math.max(0.5, 0.1 * Math.abs(ends[0]));
+      const room = ends[0] === ends[1] ? alone : 0;
       const options = page.plotOptions(page.width(sheet), HEIGHT, { xLabel: figure.x_label, xRange: [ends[0] - room, ends[1] + room], scale: { range: span(figure) }, whole: figure.whole });
       options.axes[0].values = (_, marks) => marks.map((mark) => page.compact(mark));
       const data = [figure.x];
