@@ -69,13 +69,15 @@ def test_a_spoofer_plays_in_the_other_seat_as_in_its_own(kind: str, tmp_path: Pa
     np.testing.assert_array_equal(inside.attacks.first, 1)
 
 
-@pytest.mark.parametrize("scenario", [FLIGHT, SKY])
-def test_a_defender_plays_in_the_other_seat_as_in_its_own(scenario: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("scenario", "bank"), [(FLIGHT, None), (SKY, None), (FLIGHT, "multiple-hypothesis:hypotheses=3")]
+)
+def test_a_defender_plays_in_the_other_seat_as_in_its_own(scenario: str, bank: str | None, tmp_path: Path) -> None:
     """Once outside against an attack, once inside against the same offsets from outside."""
-    configuration = {"scenario": scenario, "attacks": "none", "detectors": list(DETECTORS[:1])}
+    configuration = {"scenario": scenario, "attacks": "none", "detectors": list(DETECTORS[:1]), "bank": bank}
     text = defender(configuration, tmp_path / "d")
     policy = LearnedDefender.load(tmp_path / "d")
-    given = DefenderConfig(scenario=scenario, detectors=DETECTORS[:1], attacks="ramp:3", **QUIET)
+    given = DefenderConfig(scenario=scenario, detectors=DETECTORS[:1], attacks="ramp:3", bank=bank, **QUIET)
     outside = DefenderGame(given, LANES, streams=streams())
     config = SpooferConfig(scenario=scenario, detector=DETECTORS[:1], on_alarm="respond", response=text)
     inside = SpooferGame(config, LANES, streams=streams())
