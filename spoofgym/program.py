@@ -11,7 +11,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol
@@ -110,6 +110,11 @@ def kept(show: Callable[[], object]) -> Iterator[None]:
     except KeyboardInterrupt:
         show()
         raise
+
+
+def goes_on(folder: str | Path) -> AbstractContextManager[None]:
+    """Say after Ctrl-C that what is finished is kept in a folder, from which the same command goes on."""
+    return kept(lambda: say(f"what is finished is kept in {folder}: the same command goes on"))
 
 
 def do_all(*steps: Callable[[], object]) -> None:

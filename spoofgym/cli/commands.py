@@ -73,7 +73,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("train league", "both sides learn against each other", f"{LEARNING}.league"),
         Command("train again", "train a published agent again", f"{LEARNING}.again"),
         Command("exploit", "how exploitable a defender is", f"{LEARNING}.exploit"),
-        Command("export", "make an agent of your own policy", f"{STUDIES}.export"),
+        Command("export", "make an agent of your own policy", "spoofgym.cli.export"),
         Command("agents", "what the published agents are worth", f"{STUDIES}.agents"),
     ),
     "bounds and papers": (

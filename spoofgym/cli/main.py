@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """The command ``spoofgym``: finds the command that is called and lets it do its work.
 
 spoofgym --help
@@ -7,12 +8,14 @@ spoofgym evaluate spoofers --attacker runs/x
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from shutil import get_terminal_size
 
 import spoofgym
 from spoofgym.cli.commands import COMMANDS, SECTIONS, Command, find, groups
+from spoofgym.cli.completion import ASKED, answer
 from spoofgym.program import USAGE, program, say
 from spoofgym.validation import nearest
 
@@ -35,6 +38,8 @@ LEAST_TOLD = 24
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command ``spoofgym``; returns its exit status."""
+    if ASKED in os.environ:
+        answer()
     given = list(sys.argv[1:] if arguments is None else arguments)
     found = find(given)
     if found is not None:

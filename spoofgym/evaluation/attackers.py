@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
@@ -55,25 +55,23 @@ class Evaluation:
 
     def rows(
         self, policies: list[LearnedSpoofer], attacks: list[Attack], progress: Progress = silent
-    ) -> list[dict[str, Any]]:
-        """Rows of the baselines, of scripted attacks and of policies, in this order.
+    ) -> Iterator[dict[str, Any]]:
+        """Rows of the baselines, of scripted attacks and of policies, in this order, each when it has been played.
 
         Check attacks and policies before: `check_attacks`, `check_layouts`.
         """
         with progress("baselines"):
             baselines = self._baselines()
         optimum = next((baseline.exact for baseline in baselines if baseline.name == "optimum"), None)
-        rows = []
         for baseline in baselines:
-            rows.append(self._row(baseline, optimum, progress))
+            yield self._row(baseline, optimum, progress)
         for attack in attacks:
-            rows.append(self._row(Baseline(attack.name, attack.knowledge, attack, None), optimum, progress))
+            yield self._row(Baseline(attack.name, attack.knowledge, attack, None), optimum, progress)
         for policy in policies:
             player = PolicySpoofer(policy)
             with progress(player.name):
                 score, exact = self._score(player), self.exact(policy)
-            rows.append(attacker_row(player.name, player.knowledge, score, exact, optimum))
-        return rows
+            yield attacker_row(player.name, player.knowledge, score, exact, optimum)
 
     def check_attacks(self, attacks: list[Attack]) -> None:
         """Refuse attacks that do not fit the game, before anything is played.

@@ -40,7 +40,7 @@ from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import MORE_GAMES, League, LeagueSettings
 from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WITHOUT_ALARM, WORLD_DETECTORS, keeps_within, tuned_for
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import do_all, give_json, goes_on, moved, program
 from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -168,7 +168,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     settings = settings_of(options)
     engine = engine_of(options)
     train = BestResponse(settings.duel, isinstance(engine, Here), options.spoofer_steps, options.defender_steps)
-    rounds = League(settings, options.out, train, engine).play(partial(terminal.print, soft_wrap=True))
+    with goes_on(options.out):
+        rounds = League(settings, options.out, train, engine).play(partial(terminal.print, soft_wrap=True))
     report = {"kind": "league", **settings.content(), "results": [each.content() for each in rounds]}
     tables = league_tables(report)
     output = console(stderr=options.json == STDOUT)

@@ -32,7 +32,7 @@ from spoofgym.evaluation.benchmark_report import measure, references
 from spoofgym.evaluation.benchmark_v1 import V1
 from spoofgym.evaluation.engine import Engine, Notify, make_engine
 from spoofgym.evaluation.report import SCHEMA_VERSION
-from spoofgym.program import FAILURE, do_all, give_json, moved, program
+from spoofgym.program import FAILURE, do_all, give_json, goes_on, moved, program
 from spoofgym.studies.benchmark_page import page_results, write_rows
 from spoofgym.studies.benchmark_presentation import (
     agrees,
@@ -97,7 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     asked = [name for text in options.tasks for name in text.split(",")]
     if options.command == REFERENCES:
         return _references(options, matches, asked, engine, notify)
-    report = measure(matches, options.command, options.policies, asked, engine, notify)
+    with goes_on(options.out):
+        report = measure(matches, options.command, options.policies, asked, engine, notify)
     _give(report_tables(report), report, options.json)
     return 0
 

@@ -42,6 +42,7 @@ from spoofgym.program import moved, program
 EXAMPLES = (
     "spoofgym export runs/x my-spoofer",
     "spoofgym export runs/d my-defender --onnx",
+    "spoofgym export mine.zip runs/mine --scenario liu-flight --knowledge shadow",
 )
 
 OPTIONS = {
@@ -58,8 +59,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(prog="spoofgym export", examples=EXAMPLES, description="Export a trained policy as an agent.")
     add = result.add_argument
-    add("run", metavar="RUN", help="run folder of a training")
-    add("out", metavar="OUT", type=Path, help="folder of the agent; its name is the agent's")
+    add("run", metavar="RUN", help="run folder of a training, or your own zip of Stable-Baselines3")
+    add("out", metavar="OUT", type=Path, help="folder of the agent or the policy; its name is the agent's")
     add("--games", type=count, default=GAMES, help="for the scores of the card (default: %(default)s)")
     add_seed(result, "game 0", SEED)
     add("--onnx", action="store_true", help="write policy.onnx, too (extra onnx)")
@@ -70,7 +71,11 @@ def parser() -> argparse.ArgumentParser:
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
-    options = parser().parse_args(arguments)
+    return make_agent(parser().parse_args(arguments))
+
+
+def make_agent(options: argparse.Namespace) -> int:
+    """Make an agent of a run folder, as the options of `parser` say; returns the exit status."""
     out: Path = options.out
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise ValueError(f"{out} exists already: choose another folder")

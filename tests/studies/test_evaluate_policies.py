@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spoofgym.evaluation import defenders
+from spoofgym.evaluation.attackers import Evaluation
 from spoofgym.policies import published
 from spoofgym.policies.classical import ClassicalDefender
 from spoofgym.studies.evaluate import defenders as evaluate_defenders
@@ -132,3 +133,18 @@ def test_what_does_not_fit_is_told_before_anything_is_played(arguments, words, c
     assert status == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
+
+
+def test_what_was_played_is_shown_after_ctrl_c(monkeypatch, capsys):
+    def interrupted(self, attack, name=""):
+        if name == "random":
+            raise KeyboardInterrupt
+        return played(self, attack, name)
+
+    played = Evaluation._score
+    monkeypatch.setattr(Evaluation, "_score", interrupted)
+    assert evaluate_spoofers.main(["--scenario", FLIGHT, "--episodes", "8"]) == 130
+    printed = capsys.readouterr()
+    assert "none" in printed.out
+    assert "closed-form" not in printed.out
+    assert printed.err == "interrupted\n"

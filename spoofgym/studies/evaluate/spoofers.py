@@ -28,7 +28,7 @@ from spoofgym.command_line import (
     add_threads,
     count,
 )
-from spoofgym.console import console
+from spoofgym.console import console, show
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.attackers import Evaluation
@@ -36,7 +36,7 @@ from spoofgym.evaluation.game_log import GameLog
 from spoofgym.evaluation.report import attackers_report
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.baselines import exact_threshold
-from spoofgym.program import program
+from spoofgym.program import kept, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.specification import registered_by_others
 from spoofgym.studies.evaluate.giving import Output, give, spoofers
@@ -117,6 +117,9 @@ def _report(options: argparse.Namespace, terminal: Console) -> tuple[dict[str, A
     evaluation.check_layouts(policies)
     evaluation.check_attacks(attacks)
     tell_what_is_new(policies, scenario, fidelity, detectors)
-    rows = evaluation.rows(policies, attacks, terminal.status)
+    rows: list[dict[str, Any]] = []
+    with kept(lambda: show(terminal, attackers_table(attackers_report(scenario, fidelity, detectors, rows)))):
+        for row in evaluation.rows(policies, attacks, terminal.status):
+            rows.append(row)
     report = attackers_report(scenario, fidelity, detectors, rows)
     return {**report, "aggregates": evaluation.aggregates(policies)}, evaluation.log
