@@ -26,7 +26,7 @@ from spoofgym.studies.presentation import recorded_figure, recorded_table
 
 EXAMPLES = (
     "spoofgym evaluate recorded FOLDER --attack ramp:0.5 --detector snapshot",
-    "spoofgym evaluate recorded FOLDER --detector cusum --p-fa 0.01 --figure log.png",
+    "spoofgym evaluate recorded FOLDER --detector mewma --p-fa 0.01 --figure a.png",
     "spoofgym evaluate recorded FOLDER,noise_factor=3 --attack jump:20 --json -",
 )
 RECORDED = "recorded"
