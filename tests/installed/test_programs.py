@@ -135,11 +135,12 @@ def test_parts_of_the_library_say_which_extra_they_need(installation: Installati
 @pytest.mark.slow
 def test_training_works_with_its_extra_from_any_folder(installation: Installation, empty: Path) -> None:
     pytest.importorskip("stable_baselines3")
-    drive, few = "--scenario foi-drive:horizon=60", "--lanes 4 --validation-episodes 20 --imitate false"
+    drive = "--scenario foi-drive:horizon=60 --detector snapshot"
+    few = "--lanes 4 --validation-episodes 20 --imitate false"
     players = "--spoofer ramp:1 --defender snapshot/exclude --games 20 --resamples 20 --workers 1"
     commands = (
         "train spoofer --scenario liu-flight:horizon=20 --steps 1 --out spoofer",
-        f"train defender {drive} --detector snapshot --steps 1 {few} --out defender",
+        f"train defender {drive} --steps 1 {few} --out defender",
         f"train league {drive} --rounds 0 {players} --out league",
     )
     done = installation.run(installation.python, "-c", in_one_process(commands), extra="train")
