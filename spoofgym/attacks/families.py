@@ -77,11 +77,15 @@ class AttackFamily(Attack):
     Args:
         manoeuvre: share of attacks that begin in view of a manoeuvre.
 
+    Attributes:
+        draws: the uniform numbers of the present episodes, (N, 12); zero where there was none yet.
+
     Raises:
         ValueError: the share is not from 0 to 1.
     """
 
     kind: str
+    draws: Floats
 
     def __init__(self, manoeuvre: float = DEFAULT_MANOEUVRE) -> None:
         self.manoeuvre = validation.share(self.kind, "manoeuvre", manoeuvre)
@@ -103,6 +107,7 @@ class AttackFamily(Attack):
             raise ValueError(f"attack {self.name!r} needs a game of more than {LEAST_LEFT:g} s")
         self._elapsed_times = timeline.times - timeline.start
         self._offsets = np.zeros((num_runs, timeline.num_epochs + 1, 3))
+        self.draws = np.zeros((num_runs, DRAWS))
         self._runs = np.arange(num_runs)
         self._first, self._last = spoofed_stretch(self._offsets)
 
@@ -118,8 +123,8 @@ class AttackFamily(Attack):
 
     def episode(self, runs: Runs, streams: RunStreams) -> Floats:
         """Draw new episodes; all their offsets, (n, K+1, 3), m ENU."""
-        draws = np.stack([streams(run, "opponent").random(DRAWS) for run in runs.tolist()])
-        return self.drawn(draws)
+        self.draws[runs] = [streams(run, "opponent").random(DRAWS) for run in runs.tolist()]
+        return self.drawn(self.draws[runs])
 
     def drawn(self, draws: Floats) -> Floats:
         """The offsets that uniform numbers (n, 12) make, (n, K+1, 3), m ENU."""

@@ -70,6 +70,11 @@ class AttackPool(Attack):
         self._name = " + ".join(self.names) if name is None else name
 
     @property
+    def members(self) -> tuple[Attack, ...]:
+        """The attacks, in the order of their names."""
+        return tuple(self._members)
+
+    @property
     def name(self) -> str:
         """The specification that builds this pool, or its members' names where none does."""
         return self._name

@@ -17,6 +17,8 @@ import numpy as np
 from spoofgym import files
 from spoofgym.archive import read_arrays
 from spoofgym.arrays import Flags, Floats
+from spoofgym.attacks.families import AttackFamily
+from spoofgym.attacks.pool import AttackPool
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DuelGame
 from spoofgym.envs.payoffs import make_payoff
@@ -25,13 +27,15 @@ from spoofgym.evaluation.duels import Cell
 from spoofgym.evaluation.engine import Engine, Notify, Task
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.geodesy import horizontal
-from spoofgym.optimum.bayes import Bayesian, Fixes, Resolution
+from spoofgym.optimum.bayes import LONGEST, SHAPE_DRAWS, Bayesian, Chooser, Fixes, Hindsight, Resolution
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
 
 BLOCK = 20
 """Games of a task."""
 UNAIDED = "always-exclude"
+DEPTH = 60
+"""Epochs that a defender can take back."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ class BoundSettings:
     def key(self, first: int) -> str:
         """Digest of all that decides a block of games, and of its first."""
         duel = {name: value for name, value in asdict(self.duel).items() if name != "threads"}
-        content = [duel, self.population, self.seed + first, min(BLOCK, self.games - first), asdict(self.resolution)]
+        count, resolution = min(BLOCK, self.games - first), asdict(self.resolution)
+        content = [duel, self.population, self.seed + first, count, resolution, NAMES]
         return hashlib.sha256(json.dumps(content, default=str, sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -66,16 +71,25 @@ class BoundGames:
     Attributes:
         harm: of the estimate that errs least, (G,), m.
         of_mean: harm of the mean of the posterior, (G,), m.
+        choosing: harm of the Bayesian who may only use a fix or leave it out, and decides at once, (G,), m.
+        taking_back: harm of the one who may also take back up to 60 epochs, (G,), m.
+        hindsight: harm that is expected of the best use of the fixes, once all are known, (G,), m; not a number where a
+            game has too many sequences of decisions.
         trusting: harm of the best filter that takes every fix for true, (G,), m.
         expected: harm that the posterior expects, not clipped, (G,), m.
+        choosing_expected: of the one who chooses, not clipped, (G,), m.
         lost: probability of the hypotheses that were given up, (G,).
         hypotheses: that were weighed at an epoch, (G,).
     """
 
     harm: Floats
     of_mean: Floats
+    choosing: Floats
+    taking_back: Floats
+    hindsight: Floats
     trusting: Floats
     expected: Floats
+    choosing_expected: Floats
     lost: Floats
     hypotheses: Floats
 
@@ -92,16 +106,18 @@ class PlayedFixes:
         available: whether there is a fix, (G, K).
         disturbance: sigma of the multipath per axis, (G, K), m.
         error: horizontal error of the unaided solution, (G, K, 2), m.
+        told: as in `Fixes`, (G, F, 6).
     """
 
     residual: Floats
     available: Flags
     disturbance: Floats
     error: Floats
+    told: Floats
 
     def of(self, game: int) -> Fixes:
         """What the Bayesian is told of a game."""
-        return Fixes(self.residual[game], self.available[game], self.disturbance[game])
+        return Fixes(self.residual[game], self.available[game], self.disturbance[game], self.told[game])
 
 
 def play_fixes(duel: DuelConfig, population: str, streams: RunStreams) -> PlayedFixes:
@@ -118,6 +134,7 @@ def play_fixes(duel: DuelConfig, population: str, streams: RunStreams) -> Played
     count = len(streams)
     game = DuelGame(duel, count, spoofer=population, defender=UNAIDED, streams=streams)
     game.reset(np.arange(count))
+    told = _told_of(game.attacks, streams)
     simulation, epochs = game.simulation, game.scenario.timeline.num_epochs
     residual, error = np.empty((count, epochs, 3)), np.empty((count, epochs, 2))
     for epoch in range(epochs):
@@ -126,7 +143,18 @@ def play_fixes(duel: DuelConfig, population: str, streams: RunStreams) -> Played
         error[:, epoch] = simulation.error[:, :2]
         simulation.observe()
     disturbed = game.confounders
-    return PlayedFixes(residual, disturbed.available[:, :epochs], disturbed.sigma[:, :epochs], error)
+    return PlayedFixes(residual, disturbed.available[:, :epochs], disturbed.sigma[:, :epochs], error, told)
+
+
+def _told_of(pool: AttackPool, streams: RunStreams) -> Floats:
+    """The numbers of the shapes of each game, (N, F, 6): of the kind that attacks its own, of others any."""
+    size = (len(pool.members), SHAPE_DRAWS)
+    told = np.stack([streams.spawn(run, "opponent").random(size) for run in range(len(streams))])
+    for place, family in enumerate(pool.members):
+        attacking = pool.member == place
+        if isinstance(family, AttackFamily):
+            told[attacking, place] = family.draws[attacking, -SHAPE_DRAWS:]
+    return told
 
 
 def play_block(settings: BoundSettings, first: int) -> BoundGames:
@@ -141,14 +169,21 @@ def play_block(settings: BoundSettings, first: int) -> BoundGames:
     """
     scenario = make_scenario(settings.duel.scenario, settings.duel.coupling)
     bayesian = Bayesian(scenario, settings.population, settings.duel.clean, settings.resolution)
-    payoff = make_payoff("error", scenario)
+    payoff, model = make_payoff("error", scenario), scenario.linear_model()
     count = min(BLOCK, settings.games - first)
     played = play_fixes(settings.duel, settings.population, RunStreams.from_seed(settings.seed + first, count))
+    short = scenario.timeline.num_epochs <= LONGEST
     rows = []
     for game in range(count):
-        found, truth = bayesian.estimates(played.of(game)), played.error[game]
-        harms = [payoff.of(horizontal(truth - point)).mean() for point in (found.median, found.mean, found.trusting)]
-        rows.append([*harms, found.expected.mean(), found.lost.sum(), found.hypotheses.mean()])
+        fixes, truth = played.of(game), played.error[game]
+        choosing, taking_back = Chooser(model, fixes), Chooser(model, fixes, DEPTH)
+        hindsight = [Hindsight(model, fixes)] if short else []
+        found = bayesian.estimates(fixes, [choosing, taking_back, *hindsight])
+        points = (found.median, found.mean, -choosing.moved, -taking_back.moved, found.trusting)
+        harms = [payoff.of(horizontal(truth - point)).mean() for point in points]
+        best = [each.costs.min() / len(truth) for each in hindsight] or [np.nan]
+        expected = [found.expected.mean(), choosing.expected.mean()]
+        rows.append([*harms[:4], *best, harms[4], *expected, found.lost.sum(), found.hypotheses.mean()])
     return BoundGames(*np.array(rows).T)
 
 
@@ -214,12 +249,28 @@ def bound_report(settings: BoundSettings, games: BoundGames, cells: list[Cell]) 
             "lost": float(games.lost.mean()),
             "hypotheses": float(games.hypotheses.mean()),
         },
+        "choosing": _beside(games.choosing, games.harm),
+        "taking_back": _beside(games.taking_back, games.harm),
+        **_hindsight(games),
         "trusting": _told("harm", games.trusting),
         "defenders": [
-            {"defender": cell.defender, **_told("harm", cell.harm), **_told("above_bound", cell.harm - games.harm)}
-            for cell in cells
+            {"defender": cell.defender, **_beside(cell.harm, games.harm)} for cell in cells
         ],
     }
+
+
+def _hindsight(games: BoundGames) -> dict[str, Any]:
+    """Of short games: what the posterior expects of the best use of the fixes in hindsight, and of the one chosen."""
+    if np.isnan(games.hindsight).any():
+        return {}
+    return {
+        "hindsight": _beside(games.hindsight, games.expected),
+        "choosing_expected": _beside(games.choosing_expected, games.expected),
+    }
+
+
+def _beside(harm: Floats, bound: Floats) -> dict[str, Any]:
+    return {**_told("harm", harm), **_told("above_bound", harm - bound)}
 
 
 def _told(name: str, values: Floats) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
     spoofgym bound bayes --scenario foi-drive --population training --games 500 --json bound.json
 
-Defenders of the table are the tuned ones of the scenario and two yardsticks, or those that ``--defender`` names. A run
-that was stopped goes on with the same command. ``docs/results/bounds.md`` says what the bound is.
+Defenders of the table are the tuned ones of the scenario and three yardsticks, or those that ``--defender`` names. A
+run that was stopped goes on with the same command. ``docs/results/bounds.md`` says what the bound is.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rich.console import Group
 from rich.table import Table
 
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, count, run_folder, share
 from spoofgym.console import console, show
 from spoofgym.envs.duel_config import DuelConfig
-from spoofgym.evaluation.bayesian_bound import BoundSettings, bound_games, bound_report, same_games
+from spoofgym.evaluation.bayesian_bound import DEPTH, BoundSettings, bound_games, bound_report, same_games
 from spoofgym.evaluation.defenders import fits
 from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.evaluation.engine import make_engine
@@ -35,7 +36,13 @@ EXAMPLES = (
     "spoofgym bound bayes --games 100 --defender tuned-onset --json bound.json",
 )
 
-YARDSTICKS = ("always-use", "always-exclude")
+YARDSTICKS = ("multiple-hypothesis", "always-use", "always-exclude")
+CHOOSERS = {
+    "choosing": "Bayesian who uses a fix or leaves it out",
+    "taking_back": f"  and may take back {DEPTH} epochs",
+    "hindsight": "least of all uses of the fixes, expected",
+    "choosing_expected": "Bayesian who uses or leaves out, expected",
+}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -52,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
     add("--resolution", choices=tuple(RESOLUTIONS), default="usual",
         help="how finely attacks are told apart (default: %(default)s)")
     add("--defender", action="append", metavar="SPEC",
-        help="who plays the same games; repeatable (default: the tuned ones, and two yardsticks)")
+        help="who plays the same games; repeatable (default: the tuned ones, and three yardsticks)")
     add("--detector", action="append", metavar="SPEC",
         help="that runs beside every defender; repeatable (default: those of the evaluations of defenders)")
     add("--workers", type=count, help="processes (default: one for each core)")
@@ -90,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "rows": rows,
     }
     output = console(stderr=options.json == STDOUT)
-    do_all(lambda: show(output, *bound_tables(report)), lambda: give_json(report, options.json))
+    do_all(lambda: show(output, Group(*bound_tables(report))), lambda: give_json(report, options.json))
     return 0
 
 
@@ -106,6 +113,9 @@ def bound_tables(report: dict[str, Any]) -> list[Table]:
         table.add_row("Bayesian, median of the posterior", _shown(bayesian, "harm"))
         table.add_row("  what the posterior expects", _shown(bayesian, "expected"), _shown(bayesian, "surprise"))
         table.add_row("Bayesian, mean of the posterior", _shown(bayesian, "of_mean"))
+        for name, told in CHOOSERS.items():
+            if name in row:
+                table.add_row(told, _shown(row[name], "harm"), _shown(row[name], "above_bound"))
         for each in sorted(row["defenders"], key=lambda each: each["harm"]):
             table.add_row(each["defender"], _shown(each, "harm"), _shown(each, "above_bound"))
         table.add_row("best filter that uses every fix", _shown(row["trusting"], "harm"))

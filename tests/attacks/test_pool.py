@@ -262,7 +262,7 @@ def test_the_share_of_clean_games_can_be_any_number():
 @pytest.mark.parametrize(
     ("attacks", "clean", "message"),
     [
-        ("trainings", 0.5, "unknown attack 'trainings'; valid names: .*training"),
+        ("trainings", 0.5, "unknown attack 'trainings'.* valid names: .*training"),
         (["ramp:1", "rmp:1"], 0.5, "unknown attack 'rmp'"),
         (["ramp:1", "ramp:1"], 0.5, "once only"),
         ([], 0.5, "at least one member"),

@@ -1,7 +1,7 @@
 """The posterior of a short game, against an enumeration that shares no equation with it but Liu's.
 
-Mean innovations and errors come from `error_map` and `expected_columns`, attacks from `RandomRamp` itself, and every
-onset, end, rate and heading of a fine grid is weighed at every epoch.
+Mean innovations and errors come from `error_map` and `expected_columns`, attacks from the families themselves, and
+every onset, end, rate and heading of a fine grid is weighed at every epoch.
 """
 
 from __future__ import annotations
@@ -9,20 +9,24 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
 
 from spoofgym.arrays import Floats
-from spoofgym.attacks.families import DRAWS, RandomRamp
+from spoofgym.attacks.families import DRAWS, AttackFamily, ClimbingSpiral, RandomRamp
 from spoofgym.navigation.loose.mean_maps import expected_columns
 from spoofgym.optimum.bayes import Bayesian, Fixes, Resolution
+from spoofgym.optimum.bayes.held_out_shapes import spiral
 from spoofgym.optimum.bayes.schedule import schedule
-from spoofgym.optimum.bayes.shapes import ramp
+from spoofgym.optimum.bayes.shapes import Shape, ramp
 from spoofgym.optimum.gain import error_map
 from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
-RATES, HEADINGS = 90, 120
+RATES, HEADINGS = 60, 80
+TOLD = np.array([0.5, 0.9, 0.8, 0.0, 0.0, 0.0])
+"""Of a spiral: it turns at 2.4 deg/s and climbs at 0.6 m/s."""
 
 
 @cache
@@ -30,13 +34,13 @@ def scenario() -> Scenario:
     return make_scenario("foi-drive:horizon=22")
 
 
-def enumerated() -> tuple[Floats, Floats, Floats]:
+def enumerated(family: AttackFamily) -> tuple[Floats, Floats, Floats]:
     """Probability of every attack (H,), its mean innovations (K, 3, H) and mean errors (K, 2, H)."""
     timeline = scenario().timeline
-    family = RandomRamp(0.0)
     family.bind(timeline, 1)
     rate, heading = np.meshgrid((np.arange(RATES) + 0.5) / RATES, np.arange(HEADINGS) / HEADINGS, indexing="ij")
     draws = np.zeros((rate.size, DRAWS))
+    draws[:, 6:] = TOLD
     draws[:, 5], draws[:, 6] = heading.ravel(), rate.ravel()
     whole = family.drawn(draws)  # from epoch 0 to the end
     when = schedule(timeline, (), 0.0)
@@ -79,14 +83,22 @@ def played(sent: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return residual, drift, whitened, error
 
 
-def test_it_is_that_of_the_enumeration() -> None:
+@pytest.mark.parametrize(("shape", "family"), [(ramp, RandomRamp(0.0)), (spiral, ClimbingSpiral(0.0))])
+def test_it_is_that_of_the_enumeration(shape: Shape, family: AttackFamily) -> None:
     epochs = scenario().timeline.num_epochs + 1
-    sent = np.zeros((3, epochs, 3))  # nothing, 0.3 m/s north from epoch 1, 0.8 m/s south-west from epoch 0
-    sent[1, 1:, 1] = 0.3 * np.arange(epochs - 1)
-    sent[2, :, :2] = -0.8 * np.sqrt(0.5) * np.arange(epochs)[:, None]
+    # nothing, 0.3 m/s north from epoch 1, and 0.8 m/s south-west from epoch 0, both as the family turns and climbs
+    draws = np.zeros((2, DRAWS))
+    draws[:, 6:] = TOLD
+    low, high = (0.2, 5.0) if shape is ramp else (0.3, 3.0)
+    draws[:, 5], draws[:, 6] = (0.0, 0.625), np.log(np.array([0.3, 0.8]) / low) / np.log(high / low)
+    family.bind(scenario().timeline, 1)
+    sent = np.zeros((3, epochs, 3))
+    sent[1:] = family.drawn(draws)
+    sent[1] = np.roll(sent[1], 1, axis=0)
+    sent[1, 0] = 0.0
     residual, drift, whitened, error = played(sent)
-    probability, shown, moved = enumerated()
-    nodes = ramp(scenario().timeline, Resolution())
+    probability, shown, moved = enumerated(family)
+    nodes = shape(scenario().timeline, Resolution(), TOLD)
     bayesian = Bayesian(scenario(), nodes, clean=0.25, resolution=Resolution(sizes=12, headings=12))
     for game in range(len(sent)):
         found = bayesian.estimates(Fixes(residual[game], np.ones(epochs, dtype=bool), np.zeros(epochs)))
@@ -102,4 +114,4 @@ def test_it_is_that_of_the_enumeration() -> None:
             total = weight.sum() + none
             assert abs(found.quiet[k] - (none + weight[waiting].sum()) / total) < 0.005
             np.testing.assert_allclose(found.mean[k] - found.trusting[k], moved[k - 1] @ weight / total, atol=0.02)
-    assert found.quiet[-1] < 1e-6 < found.quiet[3]
+    assert found.quiet[-1] < 1e-6 < found.quiet[2]

@@ -1,8 +1,9 @@
 """The bank of hypotheses of one game: which attacks may have begun, when they ended, and what each makes of the fixes.
 
 A hypothesis is a node of the tree of shapes, an onset, and an end if it has ended. Given these, mean innovations and
-mean error are linear in the attack a = r (sin θ, cos θ), so a hypothesis carries b = Σ G'ν, A = Σ G'G and the filter's
-mean error per unit of a. `sizes` integrates over a.
+mean error are affine in the attack a = r (sin θ, cos θ), so a hypothesis carries b = Σ G'ν, A = Σ G'G and the filter's
+mean error per unit of a. What is known of the attack whatever a is, its fixed offsets, is taken from ν first. `sizes`
+integrates over a.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from spoofgym.optimum.bayes.filtering import Filter
 from spoofgym.optimum.bayes.sizes import Rule, best, sizes_and_headings, support
 from spoofgym.optimum.bayes.tree import Tree
 
+REST = 4
+"""A hypothesis of little weight is integrated in one of so many epochs."""
+
 
 class Bank(NamedTuple):
     """Room for hypotheses; leading axis: C places, of which the first are taken.
@@ -30,7 +34,8 @@ class Bank(NamedTuple):
         left: of the node's mass, as `Node.left`, (C,).
         linear: b, (C, 2).
         quadratic: A: its elements 00, 01, 11, (C, 3).
-        state: mean error per unit of a, (C, 2, n).
+        state: mean error per unit of a, and that of the fixed offsets, (C, 3, n).
+        score: log likelihood ratio of the fixed offsets alone and no attack, (C,).
         weight: logarithm of the prior probability times the likelihood ratio of the hypothesis and no attack, (C,).
         excess: of the weight over its upper bound, when it was last computed, (C,).
         moments: of a: its mean (2) and covariance (00, 01, 11), (C, 5).
@@ -44,6 +49,7 @@ class Bank(NamedTuple):
     linear: Floats
     quadratic: Floats
     state: Floats
+    score: Floats
     weight: Floats
     excess: Floats
     moments: Floats
@@ -70,12 +76,11 @@ class Limits(NamedTuple):
 
     Attributes:
         kept: least posterior probability of a hypothesis that is carried on, a logarithm.
-        mixed: least posterior probability of one that enters the estimate, a logarithm.
-        spread: least posterior probability of one whose attacks enter one by one, if they differ, a logarithm.
+        spread: least posterior probability of one that is integrated anew in every epoch, and whose attacks enter the
+            estimate one by one, if they differ, a logarithm.
     """
 
     kept: float
-    mixed: float
     spread: float
 
 
@@ -105,7 +110,8 @@ def empty_bank(places: int, states: int) -> Bank:
         left=np.zeros(places),
         linear=np.zeros((places, 2)),
         quadratic=np.zeros((places, 3)),
-        state=np.zeros((places, 2, states)),
+        state=np.zeros((places, 3, states)),
+        score=np.zeros(places),
         weight=np.zeros(places),
         excess=np.zeros(places),
         moments=np.zeros((places, 5)),
@@ -121,6 +127,9 @@ def _copy(bank: Bank, source: int, target: int, scale: float) -> None:
         bank.linear[target, i] = scale * bank.linear[source, i]
         for j in range(bank.state.shape[2]):
             bank.state[target, i, j] = scale * bank.state[source, i, j]
+    for j in range(bank.state.shape[2]):
+        bank.state[target, 2, j] = bank.state[source, 2, j]
+    bank.score[target] = bank.score[source]
     for i in range(3):
         bank.quadratic[target, i] = scale * scale * bank.quadratic[source, i]
     bank.weight[target], bank.excess[target] = bank.weight[source], bank.excess[source]
@@ -139,7 +148,7 @@ def branch(bank: Bank, count: int, epoch: int, known: Knowledge) -> int:
         known: of the game.
 
     Returns:
-        Places that are taken then; more than there are, if there are too few.
+        Places that are taken then; more than there are if there are too few, and the first ones are untouched.
     """
     tree, prior, places = known.tree, known.prior, len(bank.node)
     before = count
@@ -164,7 +173,6 @@ def branch(bank: Bank, count: int, epoch: int, known: Knowledge) -> int:
             bank.prior[count] = prior.onset[bank.onset[i]] + tree.log_mass[node]
             bank.left[count], bank.excess[count] = tree.left[node, since], 0.0
             count += 1
-        bank.left[i] = tree.left[bank.node[i], since]
     for node in range(tree.first_born[1], tree.first_born[2]):
         if tree.parent[node] >= 0 or prior.onset[epoch - 1] == -np.inf:
             continue
@@ -172,6 +180,10 @@ def branch(bank: Bank, count: int, epoch: int, known: Knowledge) -> int:
             return places + 1
         _begin(bank, count, node, epoch - 1, known)
         count += 1
+    # last, so that the first places are as they were where there is too little room
+    for i in range(before):
+        if not bank.over[i]:
+            bank.left[i] = tree.left[bank.node[i], epoch - bank.onset[i]]
     return _drop_parents(bank, count, epoch, tree)
 
 
@@ -181,7 +193,7 @@ def _begin(bank: Bank, place: int, node: int, onset: int, known: Knowledge) -> N
     bank.node[place], bank.onset[place], bank.over[place] = node, onset, False
     bank.prior[place], bank.excess[place] = known.prior.onset[onset] + known.tree.log_mass[node], 0.0
     bank.left[place] = known.tree.left[node, 1]
-    bank.linear[place], bank.quadratic[place], bank.state[place] = 0.0, 0.0, 0.0
+    bank.linear[place], bank.quadratic[place], bank.state[place], bank.score[place] = 0.0, 0.0, 0.0, 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -210,25 +222,31 @@ def carry(bank: Bank, count: int, epoch: int, known: Knowledge, whitened: Floats
     tree, filter_ = known.tree, known.filter
     closed, seen, whiten, gain = filter_.closed[epoch], filter_.seen[epoch], filter_.whiten[epoch], filter_.gain[epoch]
     n = closed.shape[0]
-    offset, shown, state = np.zeros((2, 3)), np.empty((2, 3)), np.empty(n)
+    offset, shown, state = np.zeros((3, 3)), np.empty((3, 3)), np.empty(n)
     for i in range(count):
-        for a in range(2):
+        node = bank.node[i]
+        columns = 3 if tree.shifted[node] else 2
+        for a in range(3):
             for b in range(3):
-                offset[a, b] = 0.0
+                offset[a, b], shown[a, b] = 0.0, 0.0
         if not bank.over[i]:
-            profile = tree.profile[bank.node[i], epoch - bank.onset[i]]
-            along, right = profile[0], profile[1]
+            since = epoch - bank.onset[i]
+            along, right = tree.profile[node, since, 0], tree.profile[node, since, 1]
             offset[0, 0], offset[0, 1] = along, -right
             offset[1, 0], offset[1, 1] = right, along
-        for a in range(2):
-            before = bank.state[i, a]
             for b in range(3):
-                total = 0.0
-                for j in range(n):
-                    total += seen[b, j] * before[j]
+                offset[2, b] = tree.fixed[node, since, b]
+        for a in range(columns):
+            before = bank.state[i, a]
+            first = second = third = 0.0
+            for j in range(n):
+                first += seen[0, j] * before[j]
+                second += seen[1, j] * before[j]
+                third += seen[2, j] * before[j]
+            shown[a, 0], shown[a, 1], shown[a, 2] = first, second, third
+            for b in range(3):
                 for j in range(3):
-                    total -= whiten[b, j] * offset[a, j]
-                shown[a, b] = total
+                    shown[a, b] -= whiten[b, j] * offset[a, j]
             for j in range(n):
                 state[j] = gain[0, j] * offset[a, 0] + gain[1, j] * offset[a, 1] + gain[2, j] * offset[a, 2]
             for k in range(n):
@@ -238,8 +256,10 @@ def carry(bank: Bank, count: int, epoch: int, known: Knowledge, whitened: Floats
             for j in range(n):
                 before[j] = state[j]
         for b in range(3):
-            bank.linear[i, 0] += shown[0, b] * whitened[b]
-            bank.linear[i, 1] += shown[1, b] * whitened[b]
+            unexplained = whitened[b] - shown[2, b]
+            bank.score[i] += shown[2, b] * (whitened[b] - 0.5 * shown[2, b])
+            bank.linear[i, 0] += shown[0, b] * unexplained
+            bank.linear[i, 1] += shown[1, b] * unexplained
             bank.quadratic[i, 0] += shown[0, b] * shown[0, b]
             bank.quadratic[i, 1] += shown[0, b] * shown[1, b]
             bank.quadratic[i, 2] += shown[1, b] * shown[1, b]
@@ -279,18 +299,21 @@ def weigh(bank: Bank, count: int, epoch: int, known: Knowledge, limits: Limits, 
         bank.weight[i] = -np.inf
         if high <= low:
             continue
-        bound = prior_of(bank, i, epoch, known.prior) + best(bank.linear[i], bank.quadratic[i], low, high)[4]
-        # one that matters little is worth what it was, if the data are for or against it as much as for its best attack
-        weight = bound + bank.excess[i]
-        if weight < largest + limits.kept:
+        before = prior_of(bank, i, epoch, known.prior) + bank.score[i]
+        bound = before + best(bank.linear[i], bank.quadratic[i], low, high)[4]
+        # whether it matters is told by what it was worth, if the data are for it as much as for its best attack
+        bank.weight[i] = bound + bank.excess[i]
+        if bank.weight[i] < largest + limits.kept:
             continue
-        if weight > largest + limits.mixed:
-            weight = prior_of(bank, i, epoch, known.prior) + sizes_and_headings(
+        # one of little weight is integrated anew every fourth epoch
+        turn = bank.excess[i] == 0.0 or (bank.onset[i] + epoch) % REST == 0
+        if turn or bank.weight[i] > largest + limits.spread:
+            bank.weight[i] = before + sizes_and_headings(
                 bank.linear[i], bank.quadratic[i], kind, law, left, known.rule, nodes
             )
-            bank.excess[i] = weight - bound
+            bank.excess[i] = bank.weight[i] - bound
             _moments(nodes, bank.moments[i])
-        bank.weight[i] = weight
+        weight = bank.weight[i]
         if weight > largest:
             total = total * math.exp(largest - weight) + 1.0
             largest = weight

@@ -1,14 +1,17 @@
-"""The trees of the populations: what their attacks look like, as `spoofgym.attacks.families` draws them."""
+"""The shapes of the training attacks as trees, and what all shapes share.
+
+They are what `spoofgym.attacks.families` draws: profiles come from the families themselves.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from spoofgym import validation
-from spoofgym.arrays import Floats
+from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.families import (
     DRAWS,
     GROWTH_SIZE,
@@ -23,6 +26,9 @@ from spoofgym.attacks.families import (
 from spoofgym.optimum.bayes.tree import GROWTH, LOG_UNIFORM, POWER, Law, Node
 from spoofgym.timeline import Timeline
 
+SHAPE_DRAWS = 6
+"""Uniform numbers of a shape."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Resolution:
@@ -31,31 +37,38 @@ class Resolution:
     Attributes:
         sizes: nodes of the integral over the size.
         headings: nodes of the integral over the heading.
-        growth: longest cell of the time of a growth, s.
+        growth: longest cell of the time at which a shape changes, s.
+        kept: least posterior probability of a hypothesis that is carried on.
+        told: whether the Bayesian is told all of a shape but its size and its heading.
     """
 
     sizes: int = 8
     headings: int = 8
     growth: float = 0.5
+    kept: float = 1e-7
+    told: bool = False
 
     def __post_init__(self) -> None:
         owner = "resolution"
         validation.whole(owner, "sizes", self.sizes, 2, 64)
         validation.whole(owner, "headings", self.headings, 4, 256)
         validation.above(owner, "growth", self.growth)
+        validation.between(owner, "kept", self.kept, 1e-12, 1e-3)
 
 
 RESOLUTIONS = {
     "coarse": Resolution(sizes=5, headings=5, growth=2.0),
     "usual": Resolution(),
-    "fine": Resolution(sizes=16, headings=16, growth=0.25),
+    "fine": Resolution(sizes=16, headings=16, growth=0.25, kept=1e-9),
+    "told": Resolution(told=True),
 }
-"""By name, to see whether a figure has settled."""
+"""By name, to see whether a figure has settled, and what it is worth to know the shape."""
 
-Shape = Callable[[Timeline, Resolution], list[Node]]
+Shape = Callable[[Timeline, Resolution, Floats], list[Node]]
+"""The nodes of a kind of attack, from a game's uniform numbers of its shape, of which it takes what is told."""
 
 
-def _profile(family: AttackFamily, timeline: Timeline, *draws: float) -> Floats:
+def profile(family: AttackFamily, timeline: Timeline, *draws: float) -> Floats:
     """Offsets along the heading, to its right and up, (K+1, 3), m, of an attack from epoch 0 to the end of the game.
 
     Args:
@@ -71,67 +84,55 @@ def _profile(family: AttackFamily, timeline: Timeline, *draws: float) -> Floats:
     return family.drawn(numbers)[0][:, [1, 0, 2]]
 
 
-def ramp(timeline: Timeline, resolution: Resolution) -> list[Node]:
+def cells(span: tuple[float, float], longest: float) -> tuple[Floats, Floats]:
+    """Edges and middles of equal cells of a span, none longer than ``longest``."""
+    low, high = span
+    edges = np.linspace(low, high, max(1, round((high - low) / longest)) + 1)
+    return edges, 0.5 * (edges[:-1] + edges[1:])
+
+
+def births(times: Floats, timeline: Timeline) -> tuple[Runs, Runs]:
+    """When attacks that change at these times after their onset are told apart from one that does not.
+
+    Args:
+        times: in order, s.
+        timeline: of the game.
+
+    Returns:
+        Epochs after the onset at which each has first another offset, and for d = 0..K+1 how many have by then.
+    """
+    first = np.floor(times / timeline.interval).astype(np.int64) + 1
+    return first, np.searchsorted(first, np.arange(timeline.num_epochs + 2), side="right").astype(np.int64)
+
+
+def ramp(timeline: Timeline, resolution: Resolution, told: Floats) -> list[Node]:
     """`RandomRamp`: its size is its rate, m/s."""
-    profile = _profile(RandomRamp(), timeline, 0.0) / RAMP_RATE[0]
-    return [Node(profile, Law(LOG_UNIFORM, *RAMP_RATE), 1.0)]
+    return [Node(profile(RandomRamp(), timeline, 0.0) / RAMP_RATE[0], Law(LOG_UNIFORM, *RAMP_RATE), 1.0)]
 
 
-def jump(timeline: Timeline, resolution: Resolution) -> list[Node]:
+def jump(timeline: Timeline, resolution: Resolution, told: Floats) -> list[Node]:
     """`RandomJump`, m."""
-    profile = _profile(RandomJump(), timeline, 0.0) / JUMP_SIZE[0]
-    return [Node(profile, Law(POWER, *JUMP_SIZE, first=0.0), 1.0)]
+    return [Node(profile(RandomJump(), timeline, 0.0) / JUMP_SIZE[0], Law(POWER, *JUMP_SIZE, first=0.0), 1.0)]
 
 
-def growth(timeline: Timeline, resolution: Resolution) -> list[Node]:
+def growth(timeline: Timeline, resolution: Resolution, told: Floats) -> list[Node]:
     """`RandomGrowth`: a parabola up to half of its time of growth T, so the times are told apart from there on only.
 
     The size of the parent is 2 r / T², m/s², r the final size.
     """
+    whole = Law(LOG_UNIFORM, *GROWTH_SIZE)
+    if resolution.told:
+        return [Node(profile(RandomGrowth(), timeline, 0.0, told[1]) / GROWTH_SIZE[0], whole, 1.0)]
     shortest, longest = GROWTH_TIME
-    cells = max(1, round((longest - shortest) / resolution.growth))
-    edges = np.linspace(shortest, longest, cells + 1)
-    times, interval = 0.5 * (edges[:-1] + edges[1:]), timeline.interval
-    births = np.floor(times / (2.0 * interval)).astype(np.int64) + 1
-    since = np.arange(timeline.num_epochs + 2)
-    left = np.append(edges, longest)[np.searchsorted(births, since, side="right")]
+    edges, times = cells(GROWTH_TIME, resolution.growth)
+    first, born = births(0.5 * times, timeline)
+    left = np.append(edges, longest)[born]
     parabola = np.zeros((timeline.num_epochs + 1, 3))
-    parabola[:, 0] = (interval * since[:-1]) ** 2
+    parabola[:, 0] = (timeline.interval * np.arange(timeline.num_epochs + 1)) ** 2
     law = Law(GROWTH, *GROWTH_SIZE, first=shortest, second=longest)
-    nodes = [Node(parabola, law, 1.0, last=int(births[-1]) - 1, left=left)]
-    for time, birth in zip(times, births.tolist(), strict=True):
+    nodes = [Node(parabola, law, 1.0, last=int(first[-1]) - 1, left=left)]
+    for time, birth in zip(times, first.tolist(), strict=True):
         draw = (time - shortest) / (longest - shortest)
-        profile = _profile(RandomGrowth(), timeline, 0.0, draw) / GROWTH_SIZE[0]
-        law = Law(LOG_UNIFORM, *GROWTH_SIZE)
-        nodes.append(Node(profile, law, 1.0 / cells, parent=0, birth=birth, scale=2.0 / time**2))
-    return nodes
-
-
-POPULATION_SHAPES: dict[str, tuple[Shape, ...]] = {"training": (ramp, jump, growth)}
-"""Those of each population, which are drawn equally often."""
-
-
-def population_nodes(population: str, timeline: Timeline, resolution: Resolution) -> list[Node]:
-    """The nodes of a population's attacks.
-
-    Args:
-        population: its name.
-        timeline: of the game, longer than the shortest attack.
-        resolution: of the cells.
-
-    Raises:
-        ValueError: an unknown population.
-    """
-    validation.one_of("Bayesian bound", "population", population, tuple(POPULATION_SHAPES))
-    return mixed([shape(timeline, resolution) for shape in POPULATION_SHAPES[population]])
-
-
-def mixed(shapes: list[list[Node]]) -> list[Node]:
-    """The nodes of several shapes that are drawn equally often."""
-    nodes: list[Node] = []
-    for shape in shapes:
-        first = len(nodes)
-        for node in shape:
-            parent = node.parent + first if node.parent >= 0 else node.parent
-            nodes.append(replace(node, mass=node.mass / len(shapes), parent=parent))
+        grown = profile(RandomGrowth(), timeline, 0.0, draw) / GROWTH_SIZE[0]
+        nodes.append(Node(grown, whole, 1.0 / len(times), parent=0, birth=birth, scale=2.0 / time**2))
     return nodes

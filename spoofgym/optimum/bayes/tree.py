@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 
 LOG_UNIFORM, POWER, GROWTH = 0, 1, 2
 """Laws of a size: its logarithm is uniform; its density is a power; the start of a growth (see `shapes`)."""
@@ -52,6 +52,7 @@ class Node:
         last: last d for which the node stands; later its children hold all its mass.
         left: for each d, (K+2,): the share of the mass that no child has taken; of GROWTH, the shortest time of growth
             that is left, s.
+        fixed: offsets that come on top whatever the size and the heading, (K+1, 3), m ENU; empty = none.
     """
 
     profile: Floats
@@ -62,6 +63,7 @@ class Node:
     scale: float = 1.0
     last: int = 1 << 30
     left: Floats = field(default_factory=lambda: np.ones(0))
+    fixed: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 class Tree(NamedTuple):
@@ -76,6 +78,8 @@ class Tree(NamedTuple):
         scale: (J,).
         last: (J,).
         left: (J, K+2).
+        fixed: (J, K+1, 3).
+        shifted: whether ``fixed`` has anything, (J,).
         first_born: place of the first node that is born d epochs after the onset or later, (K+3,).
     """
 
@@ -87,6 +91,8 @@ class Tree(NamedTuple):
     scale: Floats
     last: Runs
     left: Floats
+    fixed: Floats
+    shifted: Flags
     first_born: Runs
 
 
@@ -96,7 +102,7 @@ def plant(nodes: list[Node], num_epochs: int) -> Tree:
     place = {ROOT: ROOT, **{old: new for new, old in enumerate(order)}}
     ordered = [nodes[old] for old in order]
     births = np.array([node.birth for node in ordered])
-    whole = np.ones(num_epochs + 2)
+    whole, nothing = np.ones(num_epochs + 2), np.zeros((num_epochs + 1, 3))
     return Tree(
         profile=np.stack([node.profile for node in ordered]),
         law=np.array([node.law.kind for node in ordered]),
@@ -106,5 +112,7 @@ def plant(nodes: list[Node], num_epochs: int) -> Tree:
         scale=np.array([node.scale for node in ordered]),
         last=np.array([min(node.last, num_epochs) for node in ordered]),
         left=np.stack([node.left if node.left.size else whole for node in ordered]),
+        fixed=np.stack([node.fixed if node.fixed.size else nothing for node in ordered]),
+        shifted=np.array([node.fixed.size > 0 for node in ordered]),
         first_born=np.searchsorted(births, np.arange(num_epochs + 3)),
     )
