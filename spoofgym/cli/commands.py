@@ -66,6 +66,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     ),
     "recorded logs": (
         Command("import", "make a log folder of what others have recorded", f"{STUDIES}.import_log"),
+        Command("check-log", "units, axes, clocks, holes and signs of a log", f"{STUDIES}.check_log"),
     ),
     "learn": (
         Command("train spoofer", "train a PPO spoofer", f"{LEARNING}.spoofer"),

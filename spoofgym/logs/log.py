@@ -135,8 +135,27 @@ def interpolate(solution: Fixes, time: Floats) -> tuple[Floats, Floats]:
     return displace(origin, spline(time)), spline(time, 1)
 
 
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """The files of a log as they are: each value is in its limits and times increase, and nothing more is known.
+
+    Attributes:
+        folder: of the log.
+        notes: its ``log.toml``.
+        imu: columns of the inertial samples.
+        gnss: columns of the fixes, rows that are no fix included.
+        reference: columns of the reference; None = there is none.
+    """
+
+    folder: Path
+    notes: Notes
+    imu: dict[str, Floats]
+    gnss: dict[str, Floats]
+    reference: dict[str, Floats] | None
+
+
 def read_log(folder: str | Path) -> Log:
-    """Read and check a log.
+    """Read a log.
 
     Where the mounting is unknown it is found from the whole drive, and the bias of the gyro at a standstill taken away;
     so is the delay of the fixes, unless the log states one.
@@ -153,21 +172,41 @@ def read_log(folder: str | Path) -> Log:
     Warns:
         LogWarning: rows are left out because they are no fix, or a sigma is unknown.
     """
+    return log_of(read_tables(folder))
+
+
+def read_tables(folder: str | Path) -> Tables:
+    """The files of a log; raises what `read_log` does of single values."""
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"log {str(folder)!r} is no folder; a log is a folder with log.toml, imu.csv and gnss.csv")
     notes = Notes(folder / "log.toml")
-    mounting, start = notes.mounting(), notes.seconds("start_s", None)
-    delay = notes.seconds("gnss_delay_s", 0.0)
+    notes.mounting(), notes.seconds("start_s", None)
     path = table_path(folder, "imu")
     imu = read_table(path, [IMU_COLUMNS], [], LIMITS)
     check_increasing(path, imu["t_s"])
+    return Tables(
+        folder=folder,
+        notes=notes,
+        imu=imu,
+        gnss=read_table(table_path(folder, "gnss"), [POSITION_COLUMNS], [VELOCITY_COLUMNS, *SIGMA_COLUMNS], LIMITS),
+        reference=_read_reference(folder),
+    )
+
+
+def log_of(tables: Tables) -> Log:
+    """The log that files hold; raises and warns as `read_log`."""
+    folder, notes, imu = tables.folder, tables.notes, tables.imu
+    mounting, start = notes.mounting(), notes.seconds("start_s", None)
+    delay = notes.seconds("gnss_delay_s", 0.0)
+    path = table_path(folder, "imu")
     rate = np.column_stack([imu[column] for column in IMU_COLUMNS[1:4]])
     force = np.column_stack([imu[column] for column in IMU_COLUMNS[4:]])
     magnitude = float(np.median(np.linalg.norm(force, axis=1)))
     if not PLAUSIBLE_FORCE[0] <= magnitude <= PLAUSIBLE_FORCE[1]:
         raise ValueError(
             f"{path}: the median specific force is {magnitude:.3g}; it must be in m/s² and contain gravity (about 9.8)"
+            f"{force_hint(magnitude)}"
         )
     log = Log(
         name=notes.name(folder.name),
@@ -177,8 +216,8 @@ def read_log(folder: str | Path) -> Log:
         angular_rate=rate,
         specific_force=force,
         lever_arm=notes.lever_arm(),
-        fixes=_read_fixes(table_path(folder, "gnss"), start, delay),
-        reference=_read_reference(table_path(folder, "reference"), start) if has_table(folder, "reference") else None,
+        fixes=_usable_fixes(table_path(folder, "gnss"), tables.gnss, start, delay),
+        reference=None if tables.reference is None else _usable_reference(folder, tables.reference, start),
     )
     _check_overlap(log)
     if mounting is not None:
@@ -219,22 +258,47 @@ def _check_overlap(log: Log) -> None:
         )
 
 
-def _read_fixes(path: Path, start: float, delay: float) -> Fixes:
-    table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, *SIGMA_COLUMNS], LIMITS)
+def force_hint(magnitude: float) -> str:
+    """What a median specific force of this size may be in, for a message."""
+    if abs(magnitude - 1.0) < 0.15:
+        return "; it seems to be in g (multiply it by 9.80665), or gravity is taken away (a linear acceleration)"
+    if abs(magnitude / 32.17 - 1.0) < 0.15:
+        return "; it seems to be in ft/s² (multiply it by 0.3048)"
+    if abs(magnitude / 1000.0 - 1.0) < 0.15:
+        return "; it seems to be in cm/s² (multiply it by 0.01) or milli-g (by 0.0098067)"
+    if magnitude < PLAUSIBLE_FORCE[0]:
+        return "; gravity seems to be taken away (a linear acceleration): the sensor's own samples are needed"
+    return ""
+
+
+def _usable_fixes(path: Path, table: dict[str, Floats], start: float, delay: float) -> Fixes:
     rows, lines = usable_rows(path, table, start + delay)
     check_increasing(path, rows["t_s"], lines)
-    return replace(_fixes(known_sigmas(path, rows, lines, start + delay), delay), lines=lines)
+    return replace(as_fixes(known_sigmas(path, rows, lines, start + delay), delay), lines=lines)
 
 
-def _read_reference(path: Path, start: float) -> Fixes:
+def _read_reference(folder: Path) -> dict[str, Floats] | None:
+    if not has_table(folder, "reference"):
+        return None
+    path = table_path(folder, "reference")
+    return read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS], LIMITS)
+
+
+def _usable_reference(folder: Path, table: dict[str, Floats], start: float) -> Fixes:
     """Its sigmas only tell which rows are no position."""
-    table = read_table(path, [POSITION_COLUMNS], [VELOCITY_COLUMNS, POSITION_SIGMA_COLUMNS], LIMITS)
+    path = table_path(folder, "reference")
     rows, lines = usable_rows(path, table, start, most_wild(table["t_s"]))
     check_increasing(path, rows["t_s"], lines)
-    return replace(_fixes(rows, 0.0), position_sigma=None, lines=lines)
+    return replace(as_fixes(rows), position_sigma=None, lines=lines)
 
 
-def _fixes(rows: dict[str, Floats], delay: float) -> Fixes:
+def as_fixes(rows: dict[str, Floats], delay: float = 0.0) -> Fixes:
+    """Columns of a table of positions in the units and axes behind the door, whatever they are worth.
+
+    Args:
+        rows: columns by their names.
+        delay: subtracted from the times, s.
+    """
     def enu(columns: tuple[str, ...], matrix: Floats) -> Floats | None:
         if columns[0] not in rows:
             return None

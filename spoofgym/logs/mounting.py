@@ -105,7 +105,7 @@ def find_delay(
         ValueError: too little motion, no turns, or a delay of a second or more.
     """
     blame = f"{owner}: {failure}"
-    turned, pushed = _running_integral(imu_time, angular_rate), _running_integral(imu_time, specific_force)
+    turned, pushed = running_integral(imu_time, angular_rate), running_integral(imu_time, specific_force)
     correlation = []
     for delay in DELAYS:
         intervals = _intervals(blame, imu_time, turned, pushed, fix_time - delay, velocity)
@@ -132,7 +132,7 @@ def find_mounting(
             rate that does not fit the course.
     """
     blame = f"{owner}: {NO_MOUNTING}"
-    turned, pushed = _running_integral(imu_time, angular_rate), _running_integral(imu_time, specific_force)
+    turned, pushed = running_integral(imu_time, angular_rate), running_integral(imu_time, specific_force)
     intervals = _intervals(blame, imu_time, turned, pushed, fix_time, velocity)
     moving = intervals.moving
     rotation, heading_sigma = _rotation(intervals)
@@ -181,23 +181,23 @@ def _intervals(
         forward=(np.diff(speed) / step)[used],
         right=(0.5 * (speed[:-1] + speed[1:]) * course_rate)[used],
         course_rate=course_rate[used],
-        angular_rate=_means(imu_time, turned, begin[used], end[used]),
-        specific_force=_means(imu_time, pushed, begin[used], end[used]),
+        angular_rate=means_between(imu_time, turned, begin[used], end[used]),
+        specific_force=means_between(imu_time, pushed, begin[used], end[used]),
     )
 
 
 def interval_means(time: Floats, samples: Floats, begin: Floats, end: Floats) -> Floats:
     """Of the straight lines between the samples, over each interval, (n, 3)."""
-    return _means(time, _running_integral(time, samples), begin, end)
+    return means_between(time, running_integral(time, samples), begin, end)
 
 
-def _running_integral(time: Floats, samples: Floats) -> Floats:
+def running_integral(time: Floats, samples: Floats) -> Floats:
     """Of the straight lines between the samples (n, 3), from the first sample to each, (n, 3)."""
     areas = 0.5 * (samples[1:] + samples[:-1]) * np.diff(time)[:, None]
     return np.vstack([np.zeros(3), np.cumsum(areas, axis=0)])
 
 
-def _means(time: Floats, integral: Floats, begin: Floats, end: Floats) -> Floats:
+def means_between(time: Floats, integral: Floats, begin: Floats, end: Floats) -> Floats:
     """What `interval_means` gives, from the running integral."""
     change = [np.interp(end, time, integral[:, a]) - np.interp(begin, time, integral[:, a]) for a in range(3)]
     return np.stack(change, axis=1) / (end - begin)[:, None]

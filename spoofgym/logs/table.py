@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import gzip
 import math
 import re
@@ -67,7 +68,7 @@ def read_table(
         if missing and (group in required or len(missing) < len(group)):
             raise ValueError(
                 f"{path}, line 1: column {missing[0]!r} is missing; needed together: {', '.join(group)}; "
-                f"found: {', '.join(header)[:SHOWN] or 'nothing'}"
+                f"found: {', '.join(header)[:SHOWN] or 'nothing'}{_header_hint(lines[0], header, missing[0])}"
             )
         if not missing:
             wanted += group
@@ -76,6 +77,7 @@ def read_table(
         raise ValueError(f"{path}, line 1: column {twice[0]!r} is there twice")
     if len(lines) < 3:
         raise ValueError(f"{path}: needs two lines of data or more below the header")
+    _check_widths(path, lines, len(header))
     places = [header.index(name) for name in wanted]
     try:
         values = np.loadtxt(lines[1:], delimiter=",", usecols=places, comments=None, ndmin=2)
@@ -89,8 +91,63 @@ def read_table(
         if len(wrong):
             bounds = f"{low:g} or more" if math.isinf(high) else f"between {low:g} and {high:g}"
             value = float(values[wrong[0], column])
-            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {value!r}")
+            hint = limit_hint(name, value)
+            raise ValueError(f"{path}, line {wrong[0] + 2}: {name} must be {bounds}, got {value!r}{hint}")
     return {name: np.ascontiguousarray(values[:, column]) for column, name in enumerate(wanted)}
+
+
+def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
+    """The names in the first line of a CSV file and the cells of all others, as text.
+
+    Raises:
+        ValueError: the file cannot be read or is too large.
+    """
+    lines = _lines(path)
+    return [name.strip() for name in lines[0].split(",")], [line.split(",") for line in lines[1:]]
+
+
+def _check_widths(path: Path, lines: list[str], columns: int) -> None:
+    """Refuse lines with more cells than there are names; decimal commas make such, and would shift columns."""
+    for number, line in enumerate(lines[1:], start=2):
+        if line.count(",") >= columns and line.rstrip()[-1:] != ",":
+            raise ValueError(
+                f"{path}, line {number}: has {line.count(',') + 1} values, but line 1 has {columns} names; numbers "
+                "have a decimal point, no comma"
+            )
+
+
+def limit_hint(name: str, value: float) -> str:
+    """What a value out of its limits may be, for a message."""
+    size = abs(value)
+    if name in ("lat_deg", "lon_deg") and size > 1e6:
+        return "; is it in 1e-7 degrees? Divide it by 1e7"
+    if name in ("lat_deg", "lon_deg") and size > 360.0:
+        return "; is it in degrees and minutes (ddmm.mmmm of NMEA)? It must be in degrees"
+    if name == "lat_deg":
+        return "; are lat_deg and lon_deg swapped?"
+    if name == "h_m" and size > 1e5:
+        return "; is it in millimetres?"
+    return ""
+
+
+def _header_hint(line: str, header: list[str], missing: str) -> str:
+    """Why a column may be missing, for a message."""
+    for separator, name in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
+        if line.count(separator) > line.count(","):
+            return f"; the line is separated by {name}: it must be by commas, and numbers have a decimal point"
+    if all(_is_numeral(cell) for cell in header):
+        return "; the first line must name the columns"
+    same = [name for name in header if name.strip('"\'').lower() == missing.lower()]
+    near = same or difflib.get_close_matches(missing, header, 1, 0.6)
+    return f"; is it {near[0]!r}? Names and units must be as in the log format" if near else ""
+
+
+def _is_numeral(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def check_increasing(path: Path, time: Floats, lines: Runs | None = None) -> None:
@@ -108,6 +165,14 @@ def check_increasing(path: Path, time: Floats, lines: Runs | None = None) -> Non
     if len(late):
         line = late[0] + 3 if lines is None else lines[late[0] + 1]
         others = f"; so it is in {len(late)} of {len(time)} lines" if len(late) > 1 else ""
+        step = float(time[late[0]] - time[late[0] + 1])
+        back = step + float(np.median(np.diff(time)))
+        if step == 0.0:
+            others += "; a row that is there twice, or too few digits in t_s"
+        elif abs(back - round(back)) < 0.05 and back > 0.5:
+            others += f"; the clock was set back by {back:.0f} s, or rows are in another order"
+        else:
+            others += "; sort the rows, or leave these out"
         raise ValueError(
             f"{path}, line {line}: t_s must increase, got {seconds(time[late[0] + 1])} after "
             f"{seconds(time[late[0]])}{others}"

@@ -16,9 +16,10 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.logs.checks.check import checked_log
 from spoofgym.logs.fix_rows import DEFAULT_SIGMA
 from spoofgym.logs.lever_arm import with_velocity_at_imu
-from spoofgym.logs.log import Log, read_log
+from spoofgym.logs.log import Log
 from spoofgym.logs.log_warning import warn
 from spoofgym.logs.range_epochs import range_epochs
 from spoofgym.logs.range_fixes import range_fixes
@@ -108,7 +109,7 @@ def recorded(
     )
     asked = _Fixes(fixes, velocity, sigma_floor)
     common = {"name": name, "grade": imu, "tuning": tuning, "onset": onset, "horizon": horizon}
-    family = FAMILIES[coupling](read_log(path), asked, **common)
+    family = FAMILIES[coupling](checked_log(path), asked, **common)
     return Scenario(family=family, drag_off_rate=DRAG_OFF_RATE, error_scale=10.0, clock_rate=DRAG_OFF_RATE[0])
 
 

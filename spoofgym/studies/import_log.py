@@ -1,4 +1,4 @@
-"""Makes a log folder of what another program or device has recorded, and tells what was found."""
+"""Makes a log folder of what another program or device has recorded, tells what was found, and checks it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spoofgym.command_line import Parser
+from spoofgym.logs.checks.check import all_findings
 from spoofgym.logs.importers.recording import AXES, Options
 from spoofgym.logs.importers.registry import IMPORTERS, read_source
 from spoofgym.logs.importers.summary import summary
@@ -28,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
     formats = "; ".join(f"{name}: {importer.told}" for name, importer in IMPORTERS.items())
     result = Parser(
         prog="spoofgym import",
-        description="Make a log folder of what another program or device has recorded, and tell what was found.",
+        description="Make a log folder of what others have recorded, tell what was found, and check it.",
         examples=EXAMPLES,
     )
     result.add_argument("source", type=Path, metavar="SOURCE", help=f"file or folder. {formats}")
@@ -65,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         recording.axes = options.axes
     tidy(recording, options.begin, options.end)
     write_log(recording, options.out, options.name or options.out.resolve().name)
-    print("\n".join([*summary(recording), f"written: {options.out}"]))
+    print("\n".join([*summary(recording), f"written: {options.out}"]), flush=True)
+    print("\n".join(f"{finding.severity}: {finding}" for finding in all_findings(options.out)) or "no fault found")
     return 0
 
 

@@ -1,0 +1,1 @@
+"""Whether a recorded log says what it seems to: units, axes, signs, clocks and holes, by what contradicts them."""
