@@ -16,7 +16,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
-from spoofgym.logs.checks.check import checked_log
+from spoofgym.logs.checks.check import check_ranges_of, checked_log
 from spoofgym.logs.fix_rows import DEFAULT_SIGMA
 from spoofgym.logs.lever_arm import with_velocity_at_imu
 from spoofgym.logs.log import Log
@@ -109,7 +109,10 @@ def recorded(
     )
     asked = _Fixes(fixes, velocity, sigma_floor)
     common = {"name": name, "grade": imu, "tuning": tuning, "onset": onset, "horizon": horizon}
-    family = FAMILIES[coupling](checked_log(path), asked, **common)
+    log = checked_log(path)
+    if coupling == "tight" or fixes == "ranges":
+        check_ranges_of(path)
+    family = FAMILIES[coupling](log, asked, **common)
     return Scenario(family=family, drag_off_rate=DRAG_OFF_RATE, error_scale=10.0, clock_rate=DRAG_OFF_RATE[0])
 
 

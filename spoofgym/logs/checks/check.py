@@ -44,6 +44,15 @@ def checked_log(folder: str | Path) -> Log:
     return log
 
 
+def check_ranges_of(folder: str | Path) -> None:
+    """Refuse a log whose ranges are to be used and contradict themselves.
+
+    Raises:
+        ValueError: naming the first error.
+    """
+    _stop(Path(folder), list(check_ranges(Path(folder))))
+
+
 def _stop(folder: Path, findings: list[Finding]) -> None:
     errors = [finding for finding in findings if finding.severity == "error"]
     if errors:

@@ -176,15 +176,21 @@ def _first_gps_time(path: Path, fixes: dict[str, Floats], raw: dict[str, Floats]
 
 
 def _boot_to_gps(path: Path, fixes: dict[str, Floats], raw: dict[str, Floats]) -> float:
-    """GPS time less time since boot, s: the median of the fixes, or of the raw epochs."""
-    for table, unix in ((fixes, _fix_unix(fixes)), (raw, raw.get("utcTimeMillis", np.empty(0)))):
+    """GPS time less time since boot, s: the median of the fixes, or of the raw epochs.
+
+    In old releases fixes tell no time since boot; a receiver's own clock then gives GPS time, to a microsecond.
+    """
+    receiver = np.empty(0)
+    if {"TimeNanos", "FullBiasNanos"} <= set(raw):
+        receiver = (raw["TimeNanos"] - raw["FullBiasNanos"]) * NANO
+    for table, gps in ((fixes, _unix_to_gps(_fix_unix(fixes))), (raw, receiver)):
         boot = _elapsed(table)
         if boot is None and "ChipsetElapsedRealtimeNanos" in table:
             boot = table["ChipsetElapsedRealtimeNanos"] * NANO
-        if boot is not None and len(unix):
-            known = np.isfinite(boot) & np.isfinite(unix) & (boot > 0)
+        if boot is not None and len(gps):
+            known = np.isfinite(boot) & np.isfinite(gps) & (boot > 0)
             if known.any():
-                return float(np.median(_unix_to_gps(unix[known]) - boot[known]))
+                return float(np.median(gps[known] - boot[known]))
     raise ValueError(f"{path}: nothing tells the time since boot of a fix: elapsedRealtimeNanos is missing or empty")
 
 
@@ -199,19 +205,20 @@ def _add_fixes(recording: Recording, rows: Rows, header: Header, fixes: dict[str
     if not gps.any():
         return
 
-    def cells(name: str, empty: float) -> Floats:
-        values = fixes.get(name, np.full(len(gps), np.nan))[gps]
+    def cells(name: str, empty: float, old: str = "") -> Floats:
+        values = fixes.get(name, fixes.get(old, np.full(len(gps), np.nan)))[gps]
         return np.where(np.isfinite(values), values, empty)
 
-    speed, course = cells("SpeedMps", np.nan), cells("BearingDegrees", np.nan)
+    speed, course = cells("SpeedMps", np.nan, "Speed"), cells("BearingDegrees", np.nan)
     known = np.isfinite(speed) & (np.isfinite(course) | (speed == 0.0))
     north, east = velocity_of_course(np.nan_to_num(speed), np.nan_to_num(course))
-    accuracy = cells("AccuracyMeters", np.nan) / WITHIN_68
+    accuracy = cells("AccuracyMeters", np.nan, "Accuracy") / WITHIN_68
     sigma = np.where(known, cells("SpeedAccuracyMps", 0.0), NO_VELOCITY_SIGMA)
     recording.tables["gnss"] = {
         "t_s": _unix_to_gps(_fix_unix(fixes)[gps]) - week,
-        **{"lat_deg": cells("LatitudeDegrees", np.nan), "lon_deg": cells("LongitudeDegrees", np.nan)},
-        "h_m": cells("AltitudeMeters", np.nan),
+        "lat_deg": cells("LatitudeDegrees", np.nan, "Latitude"),
+        "lon_deg": cells("LongitudeDegrees", np.nan, "Longitude"),
+        "h_m": cells("AltitudeMeters", np.nan, "Altitude"),
         **{"vn_mps": np.where(known, north, 0.0), "ve_mps": np.where(known, east, 0.0), "vd_mps": np.zeros(len(north))},
         **{"sd_n_m": np.nan_to_num(accuracy), "sd_e_m": np.nan_to_num(accuracy)},
         "sd_d_m": cells("VerticalAccuracyMeters", 0.0),

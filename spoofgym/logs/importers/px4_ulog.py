@@ -27,8 +27,8 @@ TOPICS = (
     *("sensor_combined", "vehicle_imu", "vehicle_gps_position", "sensor_gps", "vehicle_attitude"),
     *("vehicle_air_data", "vehicle_magnetometer", "vehicle_global_position", "wheel_encoders", "airspeed_validated"),
 )
-DEFINITIONS = b"BFIMPQ"
-"""Kinds of messages before the data."""
+DEFINITIONS, DATA = b"BFIMPQ", b"ADRSOLC"
+"""Kinds of messages before the data, and in them."""
 MOST_FIELDS = 5000
 """Most numbers in a message, nested ones counted: those of PX4 have a few hundred."""
 DEEPEST = 16
@@ -85,16 +85,17 @@ def _load(path: Path) -> tuple[Any, list[str]]:
     except ImportError:
         raise ImportError(MISSING) from None
     check_definitions(path)
-    said = io.StringIO()
+    said, content = io.StringIO(), path.read_bytes()
+    end = sound_end(content)
     try:
-        with contextlib.redirect_stdout(said), path.open("rb") as file:
-            log = pyulog.ULog(file, list(TOPICS))
+        with contextlib.redirect_stdout(said):
+            log = pyulog.ULog(io.BytesIO(content[:end]), list(TOPICS))
     except Exception as error:  # pyulog raises whatever a damaged file leads to
         words = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"{path}: pyulog cannot read it: {words}") from None
     told = list(dict.fromkeys(line.strip() for line in said.getvalue().splitlines() if line.strip()))
-    if log.file_corruption:
-        told.append("the file is damaged in places; what could be read is there")
+    if end < len(content):
+        told.append(f"the file is damaged or cut at offset {end} of {len(content)}; what comes after it is left out")
     return log, told[:5]
 
 
@@ -110,8 +111,10 @@ def check_definitions(path: Path) -> None:
             raise damaged(path, 0, "no ULog header")
         while len(head := file.read(3)) == 3:
             length, kind = struct.unpack("<HB", head)
-            if kind not in DEFINITIONS:
+            if kind in DATA:
                 break
+            if kind not in DEFINITIONS:
+                raise damaged(path, offset, f"a message of kind {kind} among the definitions")
             content = file.read(length)
             if len(content) < length:
                 raise damaged(path, offset, f"a definition of {length} bytes goes beyond the end of the file")
@@ -122,6 +125,20 @@ def check_definitions(path: Path) -> None:
     counts: dict[str, int] = {}
     for name in formats:
         _count(path, name, formats, counts, 0)
+
+
+def sound_end(content: bytes) -> int:
+    """Where the first message is that goes beyond the end or is of no kind; the length where there is none.
+
+    pyulog seeks a way through whatever follows, byte by byte, which can take for ever.
+    """
+    offset, kinds = 16, DEFINITIONS + DATA
+    while offset + 3 <= len(content):
+        length = content[offset] + 256 * content[offset + 1]
+        if content[offset + 2] not in kinds or length == 0 or offset + 3 + length > len(content):
+            return offset
+        offset += 3 + length
+    return offset if offset < len(content) else len(content)
 
 
 def _count(path: Path, name: str, formats: dict[str, tuple[int, list[str]]], counts: dict[str, int], depth: int) -> int:

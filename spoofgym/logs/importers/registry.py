@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,8 +74,17 @@ def read_source(source: Path, name: str | None, options: Options) -> Recording:
     """Read a source by the importer of this name, or by the one that recognises it.
 
     Raises:
-        ValueError: an unknown name, or what the importer refuses.
+        ValueError: what the importer refuses, or whatever else a damaged source leads to; the message names the source.
+        ImportError: an optional package is not installed.
     """
+    if not source.exists():
+        raise ValueError(f"{source}: no such file or folder")
     if name is None:
         name = importer_of(source)
-    return IMPORTERS[name].read(source, options)
+    try:
+        return IMPORTERS[name].read(source, options)
+    except KeyError as error:
+        raise ValueError(f"{source}: a field that is needed is missing: {error}") from error
+    except (IndexError, TypeError, OverflowError, struct.error, RecursionError) as error:
+        words = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(f"{source}: is damaged: {words}") from error

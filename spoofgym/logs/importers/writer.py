@@ -19,12 +19,21 @@ from spoofgym.logs.table import LARGEST
 
 PACKED = ("imu", "ranges", "ranges_other")
 """Tables that are written as ``.csv.gz``."""
+MIN_SPEED = 5.0
+"""Speed from which on the alignment takes a course for the heading, m/s."""
+SLOW = 1.0
+"""Speed below which no course is believed, m/s."""
+FORWARD = np.radians(8.0)
+"""Largest difference of course and yaw of a vehicle that moves forward, rad."""
 CHUNK = 20_000
 """Rows that are formatted at a time."""
 
 
 def start_of(recording: Recording) -> float:
-    """The first fix within the inertial samples: the alignment looks for a moving vehicle from there on.
+    """The first fix within the inertial samples from which on the course may be the heading.
+
+    The alignment takes the first moving fix from there on. Where the source has an attitude, it is the first fix at
+    which the vehicle moves and its course is its yaw: a copter or a boat may go sideways before.
 
     Raises:
         ValueError: there is none.
@@ -37,7 +46,33 @@ def start_of(recording: Recording) -> float:
             f"{recording.kind}: no fix lies within the inertial samples: these are from {imu[0]:.3f} to {imu[-1]:.3f} "
             f"s, the fixes from {fixes[0]:.3f} to {fixes[-1]:.3f} s ({recording.clock})"
         )
-    return float(fixes[inside[0]] - fix_delay)
+    first = _first_forward(recording, inside, fix_delay - imu_delay)
+    return float(fixes[inside[0] if first is None else first] - fix_delay)
+
+
+def _first_forward(recording: Recording, inside: np.ndarray, delay: float) -> int | None:
+    """The first of some fixes whose course is the yaw of the attitude; None = nothing tells, or there is none."""
+    fixes, attitude = recording.tables["gnss"], recording.tables.get("attitude", {})
+    if "vn_mps" not in fixes or "yaw_rad" not in attitude or len(attitude["t_s"]) < 2:
+        return None
+    north, east, time = fixes["vn_mps"][inside], fixes["ve_mps"][inside], fixes["t_s"][inside] - delay
+    yaw = np.interp(time, attitude["t_s"], np.unwrap(attitude["yaw_rad"]))
+    off = np.abs(np.angle(np.exp(1j * (np.arctan2(east, north) - yaw))))
+    speed = np.hypot(north, east)
+    moving = speed >= min(MIN_SPEED, 0.8 * float(np.max(speed)))
+    if float(np.max(speed)) < SLOW or not moving.any():
+        return None
+    forward = moving & (off < FORWARD)
+    if forward[np.argmax(moving)]:
+        return None  # the first moving fix will do
+    if not forward.any():
+        recording.problems.append(
+            f"attitude: the vehicle never moves forward: its course is {np.degrees(np.median(off[moving])):.0f} "
+            "degrees off its yaw (median); the filter takes the course for the heading and will err"
+        )
+        return None
+    recording.problems.append("attitude: the vehicle first moves sideways; start_s is where its course is its yaw")
+    return int(inside[np.argmax(forward)])
 
 
 def write_log(recording: Recording, folder: Path, name: str) -> None:
@@ -87,7 +122,7 @@ def notes(recording: Recording, name: str) -> str:
     rows = ", ".join("[" + ", ".join(map(str, row)) + "]" for row in AXES[recording.axes])
     comment = "  # unknown: found from the drive" if not rows else f"  # sensor axes: {recording.axes}"
     lines = [f"name = {_text(name)}", f"imu_to_body_frd = [{rows}]{comment}"]
-    lines += [f"start_s = {start_of(recording):.6f}  # the first fix within the inertial samples"]
+    lines += [f"start_s = {start_of(recording):.6f}"]
     lines += [f"{key} = {value!r}" for key, value in recording.settings.items()]
     lines += [f"source = {_text(recording.kind)}", f"time = {_text(recording.clock)}"]
     if recording.remarks or recording.problems:

@@ -114,6 +114,15 @@ def test_formats_that_multiply_are_refused(tmp_path: Path) -> None:
         check_definitions(path)
 
 
+def test_what_comes_after_damage_is_left_out(tmp_path: Path) -> None:
+    """pyulog would seek a way through it for ever."""
+    whole = ulog(new=False)
+    path = tmp_path / "drive.ulg"
+    path.write_bytes(whole + b"\xff\xff\x00" + bytes(100))
+    recording, _ = imported(path, tmp_path / "log")
+    assert f"damaged or cut at offset {len(whole)} of {len(whole) + 103}" in recording.problems[0]
+
+
 @pytest.mark.parametrize("length", [17, 60, 200, 1000])
 def test_a_file_that_is_cut_is_refused_in_one_line(tmp_path: Path, length: int) -> None:
     path = tmp_path / "cut.ulg"
