@@ -17,6 +17,8 @@ FAST = 4.0
 """Speed at both ends of an interval that tells how long it was, m/s."""
 STEP = 0.45
 """Least difference between an interval and the time that its way took that is told, s."""
+LARGEST_STEP = 25.0
+"""Difference from which on the fix has leapt, and not its clock, s."""
 HOLE = 5.0
 """Time without fixes that is told, s, and usual intervals, whichever is longer."""
 
@@ -52,7 +54,7 @@ def check_steps(fixes: Fixes, start: float) -> Iterator[Finding]:
     way = np.linalg.norm(np.diff(track, axis=0), axis=1)
     fast = (np.minimum(speed[1:], speed[:-1]) > FAST) & (interval < 10.0) & (np.abs(np.diff(speed)) < 2.0)
     taken = way / np.maximum(0.5 * (speed[1:] + speed[:-1]), 1e-9)
-    off = np.where(fast, interval - taken, 0.0)
+    off = np.where(fast & (np.abs(interval - taken) < LARGEST_STEP), interval - taken, 0.0)
     large = np.flatnonzero(np.abs(off) > STEP + 0.25 * usual)
     if 1 <= len(large) <= max(3, int(fast.sum()) // 50):
         first = large[0]
