@@ -16,7 +16,7 @@ import spoofgym
 pytestmark = pytest.mark.xdist_group("installed")
 
 ROOT = Path(__file__).parents[2]
-EXTRAS = {"sb3", "train", "render", "multiagent", "logs", "ray", "onnx", "docs", "dev"}
+EXTRAS = {"sb3", "train", "render", "multiagent", "logs", "ray", "onnx", "completion", "docs", "dev"}
 LARGEST_WHEEL = 5_000_000
 """Bytes; the package is code and small policies."""
 
