@@ -142,7 +142,7 @@ def test_a_defender_that_sees_a_bank_begins_with_what_it_says(tmp_path):
     [
         (defender, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: "),
         (defender, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: "),
-        (defender, ["--detector", "snapshot", "--attacks", "rain"], "unknown attack 'rain'; valid names: "),
+        (defender, ["--detector", "snapshot", "--attacks", "rain"], "unknown attack 'rain'"),
         (defender, ["--detector", "snapshot", "--detector", "snapshot"], "each detector can be given once only"),
         (defender, ["--scenario", "foi-drive:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
         (defender, ["--bank", "exclude"], "bank: a bank is spelled multiple-hypothesis or multiple-hypothesis:"),
