@@ -146,7 +146,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
 
     ## Rendering
 
-    | `render_mode` | What `render()` gives | Needs |
+    | Mode | What `render()` gives | Needs |
     |---|---|---|
     | "human" | None: a window shows the figure at every `reset` and `step` | `spoofgym[render]` |
     | "rgb_array" | the figure of the game so far, (540, 960, 3) | `spoofgym[render]` |

@@ -217,7 +217,7 @@ class SpooferEnv(SingleEnv):
 
     ## Rendering
 
-    | `render_mode` | What `render()` gives | Needs |
+    | Mode | What `render()` gives | Needs |
     |---|---|---|
     | "human" | None: a window shows the figure at every `reset` and `step` | `spoofgym[render]` |
     | "rgb_array" | the figure of the game so far, (540, 960, 3) | `spoofgym[render]` |

@@ -14,7 +14,7 @@ from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.logs.checks.check import all_findings
 from spoofgym.logs.checks.finding import Finding
 from spoofgym.logs.log_warning import LogWarning
-from spoofgym.program import USAGE, do_all, give_json, program
+from spoofgym.program import USAGE, do_all, give_json, moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 
@@ -102,4 +102,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym check-log"))

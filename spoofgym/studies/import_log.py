@@ -15,7 +15,7 @@ from spoofgym.logs.importers.registry import IMPORTERS, read_source
 from spoofgym.logs.importers.summary import summary
 from spoofgym.logs.importers.tidy import tidy
 from spoofgym.logs.importers.writer import check_target, write_log
-from spoofgym.program import program
+from spoofgym.program import moved, program
 
 EXAMPLES = (
     "spoofgym import flight.ulg -o runs/flight",
@@ -72,4 +72,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(moved("spoofgym import"))

@@ -29,7 +29,7 @@ def trainings(tmp_path, monkeypatch):
         learning.Path(out).write_text(json.dumps({"rows": rows}))
         return 0
 
-    monkeypatch.setattr(learning.evaluate, "main", evaluated)
+    monkeypatch.setattr(learning.evaluate_spoofers, "main", evaluated)
     return commands
 
 

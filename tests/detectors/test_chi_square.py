@@ -184,7 +184,7 @@ def test_make_detector_takes_objects():
 @pytest.mark.parametrize(
     ("specification", "message"),
     [
-        ("snapshoot", "unknown detector 'snapshoot'; valid names: acceleration, acna, aime, "),
+        ("snapshoot", "unknown detector 'snapshoot': did you mean 'snapshot'\\? valid names: acceleration, "),
         ("snapshot:window=3", "no option 'window'; valid options: threshold, p_fa, preset, arl0"),
         ("snapshot:0", "threshold must be a finite number greater than 0, got 0.0"),
         ("snapshot:nan", "threshold must be a finite number greater than 0, got nan"),

@@ -6,11 +6,16 @@ import importlib
 import os
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from spoofgym.attacks import ATTACKS
 from spoofgym.cli.commands import find
+from spoofgym.detectors import DETECTORS
+from spoofgym.responses import RESPONSES
+from spoofgym.scenarios import SCENARIOS
 from tests.docs.pages import ROOT, Block, blocks, commands, name, pages
 
 NUMBER = r"\d+(?:\.\d+)?"
@@ -69,6 +74,16 @@ def check_printed(lines: list[str], block: Block) -> None:
         if block.exact:
             found, said = ([float(x) for x in re.findall(NUMBER, text)] for text in (line, wanted))
             assert found == pytest.approx(said, rel=0.2, abs=6.0 if "%" in line else 0.0), line
+
+
+@pytest.fixture(autouse=True)
+def registries() -> Iterator[None]:
+    """Parts that a page registers are gone after its test."""
+    before = [(registry, dict(registry)) for registry in (ATTACKS, DETECTORS, RESPONSES, SCENARIOS)]
+    yield
+    for registry, content in before:
+        registry.clear()
+        registry.update(content)
 
 
 @pytest.mark.parametrize("path", [path for path in pages() if commands(path)], ids=name)

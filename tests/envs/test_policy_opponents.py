@@ -193,7 +193,7 @@ def test_what_a_game_does_not_offer_is_refused_when_it_is_built(tmp_path: Path) 
         ("pool:exclude+latch,shares=1+1", "a pool is spelled"),
         ("pool:", "a pool is spelled"),
         ("cusum > exclude", "no detector 'cusum'; there are: snapshot; a response follows a detector of its game"),
-        ("windowed:n=5", "is a detector: name the response to its alarm, too, e.g. 'windowed:n=5 > exclude'"),
+        ("windowed:n=5", "is a detector: name the response to its alarm, too, e.g. 'windowed:n=5/exclude'"),
     ],
 )
 def test_specifications_that_say_nothing_are_refused(text: str, message: str) -> None:

@@ -94,7 +94,7 @@ def test_spelling(text):
 
 @pytest.mark.parametrize("text", ["snapshot", "", ">", "snapshot >", "> exclude"])
 def test_other_texts_are_told_how_to_spell(text):
-    with pytest.raises(ValueError, match=r"spelled 'detector > response', e\.g\. 'snapshot > exclude', got"):
+    with pytest.raises(ValueError, match=r"spelled detector/response, e\.g\. snapshot/exclude, got"):
         parse(text)
 
 

@@ -72,5 +72,5 @@ def test_files_of_other_satellites_are_refused(tmp_path):
 
 def test_without_pyrtklib_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyrtklib", None)
-    with pytest.raises(ImportError, match=r'pip install "spoofgym\[rinex\]"'):
+    with pytest.raises(ImportError, match=r'pip install "spoofgym\[logs\]"'):
         read_rinex(tmp_path / "brdc3270.20n", 0.0)
