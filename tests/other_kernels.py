@@ -17,6 +17,7 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 NOT_NUMERICAL = (
     *("train", "policies", "learning", "kernels", "installed", "test_package.py", "test_readme.py", "test_tutorial.py"),
+    *("cli", "docs", "report", "logs/importers"),
     *("test_animation.py", "test_archive.py", "test_command_line.py", "test_console.py", "test_files.py"),
     "test_program.py",
     *("test_copies.py", "envs/test_copied_games.py", "envs/test_actions.py", "envs/test_sb3.py", "test_conftest.py"),
@@ -30,8 +31,8 @@ NOT_NUMERICAL = (
     *("studies/test_trained_on.py", "studies/test_wrong_shadow.py"),
     *("logs/test_table.py", "logs/test_notes.py", "test_house.py", "test_other_kernels.py"),
 )
-"""Left out: programs, learners, who plays, files, words, copies, refused actions, what is kept on disk, and shares of
-simulated games, which rounding does not move. All else is numerical, what is added included."""
+"""Left out: programs, pages, importers, learners, who plays, files, words, copies, refused actions, what is kept on
+disk, and shares of simulated games, which rounding does not move. All else is numerical, what is added included."""
 OLDEST = {"x86_64": "Nehalem", "amd64": "Nehalem", "aarch64": "ARMV8", "arm64": "ARMV8"}
 
 
