@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
+from collections import ChainMap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +24,7 @@ from spoofgym.specification import unknown_name, write
 REGISTRIES: dict[str, Mapping[str, Callable[..., Any]]] = {
     "scenarios": SCENARIOS,
     "detectors": DETECTORS,
-    "attacks": {**ATTACKS, **OPTIMAL},
+    "attacks": ChainMap(OPTIMAL, ATTACKS),  # a view: attacks of one's own are registered later
     "responses": RESPONSES,
 }
 GIVEN = {

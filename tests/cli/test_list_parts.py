@@ -5,6 +5,7 @@ import shlex
 
 import pytest
 
+from spoofgym.attacks import ATTACKS
 from spoofgym.cli import play
 from spoofgym.cli.list_parts import KINDS, main
 from spoofgym.cli.parts import REGISTRIES, parts
@@ -80,12 +81,17 @@ def test_parts_of_ones_own_are_listed(tmp_path, monkeypatch, capsys):
         "class Mine(Snapshot):\n"
         "    '''A test of my own. It is like the other.'''\n"
         "DETECTORS['mine'] = Mine\n"
+        "from spoofgym.attacks import ATTACKS\n"
+        "ATTACKS['my-ramp'] = ATTACKS['ramp']\n"
     )
     try:
         assert main(["detectors", "mine", "--import", "parts_of_a_test"]) == 0
         assert "A test of my own." in capsys.readouterr().out
+        assert main(["attacks"]) == 0
+        assert "my-ramp" in capsys.readouterr().out
     finally:
         del REGISTRIES["detectors"]["mine"]
+        ATTACKS.pop("my-ramp", None)
     with pytest.raises(SystemExit) as ended:
         main(["detectors", "--import", "no_such_module"])
     assert ended.value.code == 2
