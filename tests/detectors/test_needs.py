@@ -16,9 +16,6 @@ from spoofgym.scenarios.recorded import recorded
 from spoofgym.simulation import Simulation
 from spoofgym.trajectory import Straight, Turn, fly
 
-# the drive has no noise and hardly an acceleration, which the checks of logs find strange
-pytestmark = pytest.mark.filterwarnings("ignore::spoofgym.logs.log_warning.LogWarning")
-
 SCENARIO = "liu-flight:horizon=10"
 ODOMETER = (
     r"detector 'wheels' needs odometer, which scenario 'liu-flight:horizon=10' does not give; it gives: inertial "

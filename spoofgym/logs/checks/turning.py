@@ -34,6 +34,8 @@ BETTER = 0.3
 """Largest share of the square of the motion left unexplained with an offset that is told, of that without."""
 DEGREES = (30.0, 110.0)
 """Ratio of the yaw rate to the course rate where the gyroscope is in degrees per second: 57.3."""
+FELT = 0.02
+"""Least horizontal specific force that is compared, root mean square, m/s²: in a coordinated turn there is none."""
 TURNED = np.radians(25.0)
 """Least angle about the vertical by which a mounting is said to be wrong, rad."""
 
@@ -163,7 +165,8 @@ def _check_yaw(now: Motion) -> Iterator[Finding]:
 def _check_force(now: Motion) -> Iterator[Finding]:
     """Where forward points, by a regression of the horizontal force on the acceleration, and how large it is."""
     power = float(np.sum(np.abs(now.acceleration) ** 2))
-    if now.force_correlation < SURE or power == 0.0:
+    felt = float(np.sqrt(np.mean(np.abs(now.force) ** 2)))
+    if now.force_correlation < SURE or power == 0.0 or felt < FELT:
         return
     gain = np.sum(now.force * np.conj(now.acceleration)) / power
     angle = float(np.angle(gain))
