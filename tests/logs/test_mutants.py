@@ -12,7 +12,8 @@ from spoofgym.logs.checks.check import all_findings, checked_log
 from spoofgym.logs.checks.finding import Finding
 from spoofgym.logs.log_warning import LogWarning
 from tests.logs.importers.drive import ABSENT, DATA
-from tests.logs.mutants import FILTERED, MUTANTS, OK, good
+from tests.logs.mutants import FILTERED, MUTANTS, OK
+from tests.logs.spoilt import good
 
 REAL = ("car-comma", "car-kaist", "car-long-loop", "car-loop", "car-phone-raw", "car-rtk", "uav-octa", "uav-thor")
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from spoofgym.studies.check_log import main
-from tests.logs.mutants import FILTERED, MUTANTS, good
+from tests.logs.mutants import FILTERED, MUTANTS
+from tests.logs.spoilt import good
 
 
 def write(folder: Path, name: str | None = None) -> Path:
