@@ -200,6 +200,11 @@ class SpooferSeat:
         """
         return np.minimum(np.maximum(rates("spoofer", actions, self.offset.shape), -1.0), 1.0)
 
+    def towards(self, offset: Floats) -> Floats:
+        """The rates that send ``offset`` at the coming epoch, or come as near to it as they may, (N, 3) or (N, 4)."""
+        index = np.minimum(self.simulation.epoch.index, self._horizon - 1)
+        return np.minimum(np.maximum((offset - self.offset) / self._reach[index], -1.0), 1.0)
+
     def act(self, actions: Floats, restarting: Runs | None = None) -> Floats:
         """What is sent at the coming epoch.
 

@@ -34,7 +34,7 @@ class BestResponse:
     shows: bool
     spoofer_steps: int
     defender_steps: int
-    spoofer_settings: ppo.Settings = field(default_factory=ppo.Settings)
+    spoofer_settings: ppo.Settings = field(default_factory=lambda: ppo.Settings(**ppo.SCRIPTED_START))
     defender_settings: defender_ppo.Settings = field(default_factory=defender_ppo.Settings)
 
     def __call__(self, side: str, opponent: str, folder: Path, seed: int) -> str:

@@ -39,6 +39,7 @@ from spoofgym.evaluation.engine import ENGINES, Engine, Here, make_engine
 from spoofgym.evaluation.payoff import META_STRATEGIES, RESAMPLES
 from spoofgym.learning.best_response import BestResponse
 from spoofgym.learning.double_oracle import MORE_GAMES, League, LeagueSettings
+from spoofgym.learning.scripted_start import OPTIMAL, SCRIPTED
 from spoofgym.policies.classical import PUBLISHED, SEPARATOR, WITHOUT_ALARM, WORLD_DETECTORS, keeps_within, tuned_for
 from spoofgym.program import do_all, give_json, goes_on, moved, program
 from spoofgym.responses import make_response
@@ -46,10 +47,7 @@ from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.league_presentation import league_figure, league_tables
 
-SPOOFERS = (
-    *("ramp:0.1", "ramp:0.2", "ramp:0.5", "ramp:1", "ramp:2", "jump:20", "training"),
-    *("unseen:4", "unseen:16", "unseen:64"),
-)
+SPOOFERS = (*SCRIPTED, "training", *OPTIMAL)
 
 EXAMPLES = (
     "spoofgym train league --scenario foi-drive --out runs/league",

@@ -27,6 +27,8 @@ from spoofgym.learning.scaled_rewards import ScaledRewards, duel_factor
 from spoofgym.policies.learned import LearnedSpoofer
 
 AnySpooferConfig = SpooferConfig | DuelSpooferConfig
+SCRIPTED_START = {"scripted": True, "trials": 1, "lanes": 128, "log_std": -3.0, "learning_rate": 1e-3}
+"""Settings of a training that begins with a scripted attack: noise of the usual size would give the attack away."""
 LAST_RATE = 0.02
 """Share of the learning rate at which its fall ends: the last rollout overshoots the number of steps."""
 
@@ -46,6 +48,8 @@ class Settings:
         clip_range: of the policy ratio.
         max_grad_norm: at which the gradient of a minibatch is clipped.
         hidden: width of the two hidden layers of policy and value.
+        scripted: begin with the best scripted or optimal attack (`spoofgym.learning.scripted_start`), in a duel.
+        critic_games: games of every lane in which only the critic learns, after that.
     """
 
     lanes: int = 256
@@ -58,6 +62,8 @@ class Settings:
     clip_range: float = 0.2
     max_grad_norm: float = 10.0
     hidden: int = 64
+    scripted: bool = False
+    critic_games: int = 2
 
     def __post_init__(self) -> None:
         """Refuse a number that is none of a training.
@@ -69,6 +75,8 @@ class Settings:
             self,
             limits.PPO
             | {
+                "scripted": limits.SWITCH,
+                "critic_games": limits.whole(0, 10_000),
                 "trials": limits.whole(1, 1000),
                 "log_std": limits.real(-20.0, 20.0),
                 "max_grad_norm": limits.real(0.0, 1e6),

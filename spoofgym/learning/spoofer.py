@@ -26,9 +26,9 @@ from spoofgym.command_line import Parser, count, share
 from spoofgym.envs.config import ACTIONS, SpooferConfig, configure
 from spoofgym.envs.duel_config import DuelSpooferConfig
 from spoofgym.evaluation.duels import with_detectors_of
-from spoofgym.learning import checkpoint
+from spoofgym.learning import checkpoint, scripted_start
 from spoofgym.learning.curve import LearningCurve
-from spoofgym.learning.ppo import Settings, export, make_learner
+from spoofgym.learning.ppo import SCRIPTED_START, Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
 from spoofgym.learning.watch import Watch, mean_return
@@ -61,6 +61,8 @@ def parser() -> argparse.ArgumentParser:
     add("--defender", metavar="SPEC",
         help="train in the duel, against this defender: snapshot/exclude, px4-auto, policy:FOLDER, pool:A+B, ...")
     add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
+    add("--scripted", action="store_true",
+        help="begin in the duel with the scripted or optimal attack that harms the defender most")
     add("--clean", type=share, help="share of clean games in the duel, which teach a spoofer nothing (default: 0)")
     add_options(result, "runs/spoofer")
     return result
@@ -72,7 +74,7 @@ def asked_run(given: dict[str, Any]) -> Run:
     Raises:
         ValueError: an option of the duel without a defender, no game with an attack, or a part that is not valid.
     """
-    arguments = {name: value for name, value in given.items() if name not in ("seed", "steps", "detector")}
+    arguments = {name: value for name, value in given.items() if name not in ("seed", "steps", "detector", "scripted")}
     detectors = tuple(given.get("detector", ()))
     config: Any
     if "defender" in arguments:
@@ -81,13 +83,14 @@ def asked_run(given: dict[str, Any]) -> Run:
             raise ValueError("--clean 1 makes every game a clean one, which teaches a spoofer nothing: give less")
         config = with_detectors_of(duel, (duel.defender,))
     else:
-        for name in ("payoff", "clean"):
-            if name in arguments:
+        for name in ("payoff", "clean", "scripted"):
+            if name in given:
                 raise ValueError(f"--{name} is of a duel: name the --defender, too")
         if detectors:
             arguments["detector"] = detectors[0] if len(detectors) == 1 else detectors
         config = configure(SpooferConfig, arguments)
-    return Run(config, Settings(), given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
+    settings = Settings(**SCRIPTED_START) if given.get("scripted") else Settings()
+    return Run(config, settings, given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
 
 
 @program
@@ -126,6 +129,8 @@ class Training:
         Raises:
             ValueError: the environment cannot be built, or the checkpoint is damaged.
         """
+        if run.learner.scripted and not isinstance(run.environment, DuelSpooferConfig):
+            raise ValueError(f"{folder.path}: only a spoofer in a duel can begin with a scripted attack")
         self._run, self._folder = run, folder
         self._trials = run.learner.trials
         self._place = Place()
@@ -196,6 +201,9 @@ class Training:
         return learner
 
     def _learn(self, steps: int) -> None:
+        settings, config = self._run.learner, self._run.environment
+        if settings.scripted and self._learner.num_timesteps == 0:
+            scripted_start.begin(self._learner, config, settings.critic_games, self._learner.seed or 0)
         self._watch.stream = (self._run.seed, self._present_trial)
         self._watch.steps_before = self._place.before
         self._watch.learn(self._learner, steps)
