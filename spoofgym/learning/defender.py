@@ -14,7 +14,7 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -35,6 +35,7 @@ from spoofgym.learning.curve import LearningCurve
 from spoofgym.learning.defender_ppo import AnyDefenderConfig, Settings, begin, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
+from spoofgym.learning.settings_options import add_settings, given_settings
 from spoofgym.learning.watch import CHECKPOINTS, Watch, mean_return
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.learned import POLICY_FILE, LearnedDefender
@@ -71,16 +72,8 @@ def parser() -> argparse.ArgumentParser:
         help="train in the duel, against this spoofer: ramp:0.5, training, policy:FOLDER, pool:A+B, ...")
     add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
     add_options(result, "runs/defender")
-    for name, value in asdict(Settings()).items():
-        kind: Any = _switch if isinstance(value, bool) else type(value)
-        add(f"--{name.replace('_', '-')}", type=kind, help=argparse.SUPPRESS)
+    add_settings(result, Settings)
     return result
-
-
-def _switch(text: str) -> bool:
-    if text not in ("true", "false"):
-        raise argparse.ArgumentTypeError(f"expected true or false, got {text!r}")
-    return text == "true"
 
 
 def asked_run(given: dict[str, Any]) -> Run:
@@ -90,7 +83,6 @@ def asked_run(given: dict[str, Any]) -> Run:
         ValueError: an option of the duel without a spoofer, attacks or a bank beside a spoofer, or a part that is not
             valid.
     """
-    settings = {name: given[name] for name in asdict(Settings()) if name in given}
     arguments: dict[str, Any] = {"detectors": tuple(given.get("detector", DETECTORS))}
     names = ("scenario", "attacks", "bank", "fidelity", "threads", "spoofer", "payoff")
     arguments |= {name: given[name] for name in names if name in given}
@@ -101,7 +93,8 @@ def asked_run(given: dict[str, Any]) -> Run:
     if "spoofer" in given and "bank" in given:
         raise ValueError("nobody sees a bank in a duel: leave --bank or --spoofer out")
     config: Any = configure(DuelDefenderConfig if "spoofer" in given else DefenderConfig, arguments)
-    return Run(config, Settings(**settings), given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
+    settings = Settings(**given_settings(given, Settings))
+    return Run(config, settings, given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
 
 
 @program

@@ -31,6 +31,7 @@ from spoofgym.learning.curve import LearningCurve
 from spoofgym.learning.ppo import SCRIPTED_START, Settings, export, make_learner
 from spoofgym.learning.run_folder import CHECKPOINT_FILE, DEFAULT_STEPS, Run, RunFolder, add_options
 from spoofgym.learning.session import train
+from spoofgym.learning.settings_options import add_settings, given_settings
 from spoofgym.learning.watch import Watch, mean_return
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.program import moved, program
@@ -61,9 +62,10 @@ def parser() -> argparse.ArgumentParser:
     add("--defender", metavar="SPEC",
         help="train in the duel, against this defender: snapshot/exclude, px4-auto, policy:FOLDER, pool:A+B, ...")
     add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
-    add("--scripted", action="store_true",
-        help="begin in the duel with the scripted or optimal attack that harms the defender most")
     add("--clean", type=share, help="share of clean games in the duel, which teach a spoofer nothing (default: 0)")
+    add_settings(result, Settings, {
+        "scripted": "begin, in the duel, with the scripted or optimal attack that harms the defender most"
+    })
     add_options(result, "runs/spoofer")
     return result
 
@@ -74,7 +76,9 @@ def asked_run(given: dict[str, Any]) -> Run:
     Raises:
         ValueError: an option of the duel without a defender, no game with an attack, or a part that is not valid.
     """
-    arguments = {name: value for name, value in given.items() if name not in ("seed", "steps", "detector", "scripted")}
+    settings = given_settings(given, Settings)
+    others = ("seed", "steps", "detector", *settings)
+    arguments = {name: value for name, value in given.items() if name not in others}
     detectors = tuple(given.get("detector", ()))
     config: Any
     if "defender" in arguments:
@@ -83,14 +87,16 @@ def asked_run(given: dict[str, Any]) -> Run:
             raise ValueError("--clean 1 makes every game a clean one, which teaches a spoofer nothing: give less")
         config = with_detectors_of(duel, (duel.defender,))
     else:
-        for name in ("payoff", "clean", "scripted"):
+        told = ("payoff", "clean", *(["scripted"] if settings.get("scripted") else []))
+        for name in told:
             if name in given:
                 raise ValueError(f"--{name} is of a duel: name the --defender, too")
         if detectors:
             arguments["detector"] = detectors[0] if len(detectors) == 1 else detectors
         config = configure(SpooferConfig, arguments)
-    settings = Settings(**SCRIPTED_START) if given.get("scripted") else Settings()
-    return Run(config, settings, given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
+    if settings.get("scripted"):
+        settings = {**SCRIPTED_START, **settings}
+    return Run(config, Settings(**settings), given.get("seed", 0), given.get("steps", DEFAULT_STEPS))
 
 
 @program

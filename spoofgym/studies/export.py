@@ -134,9 +134,8 @@ def recipe_of(kind: str, run: dict[str, Any]) -> Recipe:
     options = {name: environment[name] for name in OPTIONS[kind] if environment.get(name) is not None}
     if "detectors" in options:
         options["detector"] = options.pop("detectors")
-    if kind != SPOOFER:
-        options |= run["learner"]
-    return Recipe(f"spoofgym.learning.{kind}", {**options, "seed": run["seed"], "steps": run["steps"]})
+    learner = run.get("learner", {})
+    return Recipe(f"spoofgym.learning.{kind}", {**options, **learner, "seed": run["seed"], "steps": run["steps"]})
 
 
 def write_agent(
