@@ -48,7 +48,7 @@ def test_a_run_becomes_an_agent(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert f"{out} is an agent already: name the run folder of its training" in capsys.readouterr().err
     recipe = read_recipe(out)
     assert recipe.program == "spoofgym.learning.spoofer"
-    options = {"scenario": FLIGHT, "detector": "snapshot", "knowledge": "blind", "seed": 4, "steps": 1000}
+    options = {"scenario": FLIGHT, "detector": "snapshot", "knowledge": "blind", "lanes": 8, "seed": 4, "steps": 1000}
     assert dict(recipe.options) == options
 
 
