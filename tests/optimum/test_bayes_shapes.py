@@ -18,7 +18,7 @@ from spoofgym.attacks.pool import POPULATIONS
 from spoofgym.optimum.bayes.held_out_shapes import two_stage
 from spoofgym.optimum.bayes.populations import POPULATION_SHAPES, population_nodes
 from spoofgym.optimum.bayes.shapes import SHAPE_DRAWS, Resolution, growth, jump, ramp
-from spoofgym.optimum.bayes.tree import ROOT, Node
+from spoofgym.optimum.bayes.tree import ROOT, Node, plant
 from spoofgym.timeline import Timeline
 
 TIMELINE = Timeline.steady(20.0, 1.0, 230)
@@ -133,6 +133,15 @@ def test_a_population_is_a_mixture_of_its_shapes(population: str) -> None:
     nodes = population_nodes(population, TIMELINE, Resolution(growth=2.0), np.full((count, SHAPE_DRAWS), 0.4))
     assert sum(node.mass for node in nodes if node.parent == ROOT) == pytest.approx(1.0)
     assert len({_root(nodes, node).profile[10].tobytes() for node in nodes}) >= count
+
+
+@pytest.mark.parametrize("population", POPULATION_SHAPES)
+def test_trees_lie_in_memory_in_one_order(population: str) -> None:
+    """Arrays in another order would be another kernel, which takes ten seconds to compile."""
+    count = len(POPULATION_SHAPES[population])
+    nodes = population_nodes(population, TIMELINE, Resolution(growth=2.0), np.full((count, SHAPE_DRAWS), 0.4))
+    for some in (nodes, nodes[:1]):
+        assert all(array.flags.c_contiguous for array in plant(some, TIMELINE.num_epochs))
 
 
 def test_what_must_be_told_is_asked_for() -> None:

@@ -97,14 +97,17 @@ class Tree(NamedTuple):
 
 
 def plant(nodes: list[Node], num_epochs: int) -> Tree:
-    """The tree of nodes, whose parents stand before them."""
+    """The tree of nodes, whose parents stand before them.
+
+    Its arrays lie in memory in one order, however the profiles were made: another order would be another kernel.
+    """
     order = sorted(range(len(nodes)), key=lambda place: nodes[place].birth)
     place = {ROOT: ROOT, **{old: new for new, old in enumerate(order)}}
     ordered = [nodes[old] for old in order]
     births = np.array([node.birth for node in ordered])
     whole, nothing = np.ones(num_epochs + 2), np.zeros((num_epochs + 1, 3))
     return Tree(
-        profile=np.stack([node.profile for node in ordered]),
+        profile=np.ascontiguousarray(np.stack([node.profile for node in ordered])),
         law=np.array([node.law.kind for node in ordered]),
         law_of=np.array([(law.low, law.high, law.first, law.second) for law in (node.law for node in ordered)]),
         log_mass=np.log([node.mass for node in ordered]),
@@ -112,7 +115,7 @@ def plant(nodes: list[Node], num_epochs: int) -> Tree:
         scale=np.array([node.scale for node in ordered]),
         last=np.array([min(node.last, num_epochs) for node in ordered]),
         left=np.stack([node.left if node.left.size else whole for node in ordered]),
-        fixed=np.stack([node.fixed if node.fixed.size else nothing for node in ordered]),
+        fixed=np.ascontiguousarray(np.stack([node.fixed if node.fixed.size else nothing for node in ordered])),
         shifted=np.array([node.fixed.size > 0 for node in ordered]),
         first_born=np.searchsorted(births, np.arange(num_epochs + 3)),
     )
