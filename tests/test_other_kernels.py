@@ -3,7 +3,7 @@ import os
 import subprocess
 import sys
 
-from tests.other_kernels import NOT_NUMERICAL, ROOT, other_kernels
+from tests.other_kernels import NOT_NUMERICAL, NOT_NUMERICAL_EITHER, ROOT, other_kernels
 
 SEEN = """
 import json, numba, numpy
@@ -23,3 +23,6 @@ def test_other_code_is_chosen_without_a_warning():
 
 def test_what_is_left_out_exists():
     assert all((ROOT / "tests" / name).exists() for name in NOT_NUMERICAL)
+    for name in NOT_NUMERICAL_EITHER:
+        file, _, test = name.partition("::")
+        assert f"def {test}(" in (ROOT / "tests" / file).read_text(encoding="utf-8"), name
