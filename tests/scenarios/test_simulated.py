@@ -66,7 +66,7 @@ def test_every_environment_takes_the_object(trajectory):
         ("Spoofer", {"knowledge": "shadow"}),
         ("Defender", {"detectors": "snapshot"}),
         ("DuelSpoofer", {"defender": "snapshot > exclude"}),
-        ("DuelDefender", {}),
+        ("DuelDefender", {"detectors": "snapshot"}),  # the usual ones would be calibrated
     ):
         environment = gym.make(f"spoofgym/{name}-v0", scenario=scenario, **arguments)
         environment.reset(seed=0)
