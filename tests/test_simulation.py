@@ -18,7 +18,6 @@ from spoofgym.sensors.receiver import Receiver
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
 
-pytestmark = pytest.mark.xdist_group("simulation")
 FIDELITIES = ("linear", "strapdown")
 HORIZON = 5
 

@@ -16,7 +16,6 @@ from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 
-pytestmark = pytest.mark.xdist_group("on ranges")  # one worker: thresholds are calibrated once
 FALSE_FAILURE = 1e-7
 FLIGHT = make_scenario("kujur-flight:onset=60,horizon=20")
 RISING = make_scenario("kujur-flight:onset=60,horizon=20,hour=0.25")

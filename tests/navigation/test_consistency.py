@@ -21,7 +21,6 @@ from spoofgym.sensors.ranging import KUJUR
 from spoofgym.sensors.receiver import ZERO, Receiver
 from spoofgym.simulation import Simulation
 
-pytestmark = pytest.mark.xdist_group("consistency")  # one worker: the fixtures are played once
 FALSE_FAILURE = 2e-8
 ONSET, HORIZON = 140.0, 60
 """Into a turn that begins at 150 s, with the warm-up before it."""

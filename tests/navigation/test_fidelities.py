@@ -21,7 +21,6 @@ from spoofgym.sensors.imu import grade
 from spoofgym.sensors.receiver import Receiver
 from spoofgym.streams import RunStreams
 
-pytestmark = pytest.mark.xdist_group("fidelities")
 RUNS = 4
 SEED = 50
 

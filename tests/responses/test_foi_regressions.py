@@ -15,7 +15,6 @@ from spoofgym.studies.reproduce.foi_tables import ATTACKS, SETTINGS
 
 RUNS = 12
 K20_BACK_20, K5_BACK_20, K20_BACK_0, K5_BACK_10 = 5, 6, 7, 9
-pytestmark = pytest.mark.xdist_group("foi")
 
 
 @functools.cache

@@ -11,7 +11,6 @@ from scipy.stats import chi2
 from spoofgym.sensors.imu import GRADES, ImuGrade, gauss_markov_step, grade, white_sample
 from tests.sensors.imu_errors import simulate
 
-pytestmark = pytest.mark.xdist_group("imu")  # one worker: the long simulation is made once
 HUMP = ImuGrade(
     name="hump",
     gyro_bias=5.0,

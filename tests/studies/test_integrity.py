@@ -25,7 +25,6 @@ from spoofgym.studies.integrity import (
     play,
 )
 
-pytestmark = pytest.mark.xdist_group("integrity study")  # one worker: the spoofed flight is played once
 USERS = (FROM_P, FROM_P_TESTED, BANK, MONITOR)
 FALSE_FAILURE = 1e-8
 RUNS = 40

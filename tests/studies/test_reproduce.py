@@ -255,7 +255,6 @@ def check_report(report: Reproduction) -> dict[str, Row]:
     return items
 
 
-ON_LIU = pytest.mark.xdist_group("liu rows")  # one worker: the report is made once
 
 
 @pytest.fixture(scope="module")
@@ -263,7 +262,6 @@ def liu():
     return liu_2018.reproduce(4, 0, True)
 
 
-@ON_LIU
 def test_liu_rows(liu):
     items = check_report(liu)
     relative = [row for item, row in items.items() if item.startswith("relative change")]
@@ -283,7 +281,6 @@ def test_liu_rows(liu):
     assert "unspoofed run 0 m" in gain.reason, "backtracking to before the onset leaves nothing of the attack"
 
 
-@ON_LIU
 def test_liu_rows_on_fixes_from_ranges(liu):
     """R stands for errors that stay: without an attack the bound is broken, and slow ramps are not seen."""
     items = {row.item: row for row in liu.rows if row.item.startswith("ranges, ")}
@@ -329,7 +326,6 @@ def test_command_writes_json_alone_to_stdout(capsys):
     assert "quick" in captured.err
 
 
-@ON_LIU
 def test_tables_fit_100_columns_and_lose_nothing(liu, capsys, tmp_path, monkeypatch):
     monkeypatch.setitem(PAPERS, "liu-2018", lambda runs, seed, quick: liu)
     path = tmp_path / "new" / "rows.json"

@@ -13,7 +13,6 @@ from spoofgym.detectors import cpi_theory
 from spoofgym.studies.reproduce.kujur_games import INTERVAL, NAVIGATION, Replica, correlation_time, flight, play
 from spoofgym.studies.reproduce.kujur_windows import P_FA, coasting, cumulative_exact, windows
 
-pytestmark = pytest.mark.xdist_group("kujur")  # one worker: models and clean games are made once
 FALSE_FAILURE = 1e-8
 K = 120
 RUNS = 1000

@@ -10,7 +10,7 @@ from spoofgym.studies.reproduce import kujur_2024
 from spoofgym.studies.reproduce.__main__ import PAPERS
 from spoofgym.studies.reproduce.kujur_grids import compared
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("kujur rows")]  # one worker: the report is made once
+pytestmark = pytest.mark.slow
 
 
 def test_a_cell_agrees_in_two_digits_or_within_a_factor_of_two():

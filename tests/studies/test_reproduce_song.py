@@ -10,7 +10,6 @@ from spoofgym.studies.reproduce import song_2021
 from spoofgym.studies.reproduce.song_2021 import ACNA, CLEAN, EKF, GNSS, JUMPS, MIX, SLOW, TABLES, drive, latency
 from spoofgym.studies.reproduce.tracks import Tracks, play
 
-pytestmark = pytest.mark.xdist_group("song")  # one worker: the drives are made once
 RUNS = 40
 
 
