@@ -27,6 +27,7 @@ needs_sphinx = "8.1"
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 myst_dmath_double_inline = True
+smartquotes_action = "De"  # dashes and ellipses alone: a prime is a transpose, no quotation mark
 suppress_warnings = ["myst.header"]  # a page that is generated from a docstring begins where the docstring does
 highlight_language = "none"  # indented blocks are commands and what they print
 
