@@ -16,22 +16,27 @@ class DefenderEnv(SingleEnv):
 
     ## Description
 
-    A vehicle navigates by an inertial navigation system and GNSS fixes, which an error-state Kalman filter fuses. At
-    some time, perhaps, a spoofer moves the fixes; the receiver may also lose them for a while, or suffer multipath. At
-    every fix (an epoch) the defender, the agent, uses it or excludes it. Where it begins to exclude, it may also take
-    back fixes that were used before: the filter returns to its state of n epochs ago and is recomputed to the present
-    by inertial measurements alone. Without GNSS the estimate drifts, so that excluding too much costs as much as being
-    spoofed; taking back too little leaves spoofed fixes in the estimate and, with the covariance that they have
-    shrunk, may keep true GNSS out for good; taking back too much gives good fixes away.
+    A vehicle navigates by an inertial navigation system and GNSS fixes. An error-state Kalman filter fuses them. At
+    some time a spoofer may begin to move the fixes. The receiver may also lose them for a while, or suffer multipath.
+    The agent is the defender. At every fix (an epoch) it uses the fix or excludes it. When it begins to exclude, it may
+    also take back fixes that were used before: the filter returns to its state of n epochs ago and is recomputed to
+    the present by inertial measurements alone.
+
+    Each mistake has its price:
+
+    - Excluding too much: without GNSS the estimate drifts, which costs as much as being spoofed.
+    - Taking back too little: spoofed fixes stay in the estimate. They have also shrunk the covariance, which may keep
+      true GNSS out for good.
+    - Taking back too much: good fixes are lost.
 
     The default scenario is a drive after FOI-R-5687: 230 epochs from 20 s on, 20 m/s, two turns, a fibre-optic IMU.
     Each game draws its opponent from a population of attacks, or has none.
 
-    On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
-    fixes (`docs/reference/robot.md`): without GNSS it runs on by these. Only the horizontal error counts, there as
-    everywhere. A spoofed height does not enter the estimate there; it still shows in tests that look at the
-    height, as `snapshot` does. `relative-motion`, one of the default detectors, needs an inertial solution, which
-    the robot has not: name others.
+    On `song-robot` the filter is the credible one of a ground robot, which also uses wheel encoders and yaw
+    (`docs/reference/robot.md`). Without GNSS it goes on with these. As in every scenario, only the horizontal error
+    counts. A spoofed height does not enter the estimate there; it still shows in tests that look at the height, such
+    as `snapshot`. `relative-motion`, one of the default detectors, needs an inertial solution, which the robot does
+    not have: name others.
 
     With `coupling="tight"` (`kujur-flight`, which is tight by itself, `liu-flight`, and logs of ranges) the filter
     takes the ranges to the satellites instead of fixes, and the defender may leave out single satellites. With fewer
@@ -49,10 +54,10 @@ class DefenderEnv(SingleEnv):
 
     - First: 0 = use the fix of the present epoch, 1 = exclude it. A fix that the receiver does not give is never used.
     - Second: place in the scenario's depth table: (0, 3, 5, 8, 12, 16, 20, 25, 30, 40, 50) epochs on the drive (D =
-      11), (0, 2, 5, 10, 20, 30) on the robot, (0, 5, 10, 20, 50) elsewhere. It is read only where the last decision was
-      to use and this one is to exclude, and it is the number of epochs before the present one whose fixes are taken
-      back. A backtrack no deeper than the present coast does nothing, for there is no fix to take back; one deeper than
-      the history is cut. Both are told in `info`.
+      11), (0, 2, 5, 10, 20, 30) on the robot, (0, 5, 10, 20, 50) elsewhere. The depth is the number of epochs before
+      the present one whose fixes are taken back. It is read only if the last decision was to use and this one is to
+      exclude. A backtrack no deeper than the present coast does nothing, because there is no fix to take back. One
+      deeper than the history is cut. `info` tells both.
 
     With `coupling="tight"` it is `MultiDiscrete([2, D] + [2] * S)`, S being the satellites that are tracked at most
     (`env.unwrapped.game.scenario.slots`, eight on the Kujur flight):
@@ -63,17 +68,17 @@ class DefenderEnv(SingleEnv):
     | second | place in the depth table, as above |
     | each slot | 0 = use the range and the carrier (or range rate) of its satellite, 1 = leave them out |
 
-    A choice to leave out what an empty slot does not hold does nothing, and `info` counts it; in an outage all slots
-    are empty. To leave out every satellite in view is to exclude the epoch. Choices of satellites hold for the present
-    epoch; ranges that were used before are taken back by a backtrack alone. `env.unwrapped.action_masks()`, and that of
-    the vector environment, tells which values are open, part after part, as MaskablePPO of sb3-contrib expects: all
-    are, but to leave out an empty slot.
+    Choosing to leave out the satellite of an empty slot does nothing, and `info` counts it. In an outage all slots are
+    empty. Leaving out every satellite in view excludes the epoch. Choices of satellites hold for the present epoch;
+    only a backtrack takes back ranges that were used before. `env.unwrapped.action_masks()`, and that of the vector
+    environment, tells which values are open, part after part, as MaskablePPO of sb3-contrib expects. All are open
+    except leaving out an empty slot.
 
     ## Observation Space
 
-    `Box(float32)` with the entries below. A quantity x with a scale is squashed to y / (1 + |y|), y = x / scale; those
-    that are "not squashed" lie in [0, 1]. The table is that of the default arguments: fixes of position, four
-    detectors.
+    `Box(float32)` with the entries below. A quantity x with a scale is squashed to y / (1 + |y|), y = x / scale.
+    Quantities that are "not squashed" lie in [0, 1]. The table is that of the default arguments: fixes of position,
+    four detectors.
 
     | Index | Name | Unit | Scale |
     |---|---|---|---|
@@ -111,15 +116,15 @@ class DefenderEnv(SingleEnv):
     | 31 | accelerometer bias up over its data sheet | 1 | 1 |
     | 32 | elapsed fraction of the game | 1 | not squashed |
 
-    - Signed means are those of the whitened horizontal innovations, times the root of their number, so that each axis
-      is standard normal where the filter is matched and nobody attacks. The score of the onset estimate is the largest
+    - Signed means are those of the whitened horizontal innovations, times the root of their number. So each axis is
+      standard normal if the filter is matched and nobody attacks. The score of the onset estimate is the largest
       |sum of the last n|² / n, n up to 50, and the estimate is that n (`spoofgym.responses.onset`).
-    - Suspicion is what a classical defender believes: it rises when the squared signed mean of 5 epochs exceeds its
-      1e-3 quantile (chi-square, 2 degrees of freedom) and is dropped after 5 quiet fixes in a row, whose NIS lies below
-      its own 1e-3 quantile. Entry 19 counts such fixes on while the defender itself excludes.
+    - Suspicion is what a classical defender believes. It rises when the squared signed mean of 5 epochs exceeds its
+      1e-3 quantile (chi-square, 2 degrees of freedom). It is dropped after 5 quiet fixes in a row, whose NIS is below
+      its own 1e-3 quantile. Entry 19 continues to count such fixes while the defender itself excludes.
     - Estimates of velocity, position sigma and biases are the filter's own, before the fix of the epoch. The scale of
-      what is measured in metres is the scenario's `defender_scale`.
-    - In an outage the innovations are zero, and nothing but the last decision tells a coast by choice.
+      quantities in metres is the scenario's `defender_scale`.
+    - In an outage the innovations are zero. Only the last decision tells whether the defender coasts by choice.
 
     With `coupling="tight"` the innovations of the table are those of the ranges turned into a position
     (`Innovation.in_position`), and these entries follow the elapsed fraction:
@@ -134,17 +139,18 @@ class DefenderEnv(SingleEnv):
     | protection level of NAME over its alert limit, for each detector that has one | 1 | 1 |
 
     - Code residual: predicted minus measured range of the code, over the sigma that the filter expects of it, before
-      any range of the epoch is used: standard normal under a matched filter. Nothing is fitted to the others first, so
-      that a spoofed position shows in all slots and a single false satellite in its own. 0 in an empty slot.
+      any range of the epoch is used. It is standard normal under a matched filter. No position is fitted to the other
+      satellites first. So a spoofed position shows in all slots, and a single false satellite in its own. 0 in an
+      empty slot.
     - Protection levels horizontal and vertical are 6.0 and 5.33 sigma (K of RTCA DO-229 for approaches with vertical
       guidance) of the filter's own covariance; horizontally that of the worst direction. They are blind to spoofing,
-      because the covariance does not depend on what the ranges say (Liu 2018, section 4). Those of a detector such as
-      `separation-bank`, which compares the filter with coasting solutions, are not.
+      because the covariance does not depend on what the ranges say (Liu 2018, section 4). The level of a detector such
+      as `separation-bank`, which compares the filter with coasting solutions, is not blind.
     - Alert limits are the scenario's `alert_limits`: 556 m horizontally and 50 m vertically, or those of
       `kujur-flight:horizontal_alert_limit=40,vertical_alert_limit=35`.
 
-    With `bank="multiple-hypothesis"`, or that with options of its own, these entries come last. They tell what the bank
-    of hypotheses of that response (`docs/reference/responses.md`) expects, D being the entries of the depth table:
+    With `bank="multiple-hypothesis"`, also with options, these entries come last. They tell what the bank of hypotheses
+    of that response (`docs/reference/responses.md`) expects. D is the number of entries of the depth table:
 
     | Name | Unit | Scale (drive) |
     |---|---|---|
@@ -160,10 +166,11 @@ class DefenderEnv(SingleEnv):
     | spread of the hypotheses | m | 10 |
 
     - The expected error is that of the horizontal position; "ahead" is after ten seconds without fixes (`ahead` of the
-      bank). The gain is the mean of both moments with the fix, minus that of the best exclusion which the action can
-      still ask for; the depth is that of this exclusion. The loss at a depth is what it errs more than the best depth.
-    - A defender that excludes where the gain is positive, at the depth told, is `multiple-hypothesis` with the depth
-      table of the game.
+      bank). The gain is the mean of both moments with the fix, minus that of the best exclusion that the action can
+      still choose; the depth is that of this exclusion. The loss at a depth is its expected error minus that of the
+      best depth.
+    - A defender that excludes if the gain is positive, at the depth that is shown, is `multiple-hypothesis` with the
+      depth table of the game.
     - It needs a scenario with a linear model and an inertial solution. Scales in m and m/s are parts of the scenario's
       `defender_scale` (0.2, 0.1 and 1 of it).
 
@@ -172,22 +179,22 @@ class DefenderEnv(SingleEnv):
     ## Rewards
 
     After each decision the error of the estimate, the horizontal norm of estimate minus truth, is scored in real time:
-    recomputing past epochs does not mend what was put out then. The reward is the sum of two terms, which
+    recomputing past epochs does not change the scores of their output. The reward is the sum of two terms, which
     `info["reward_terms"]` holds:
 
     - `error`: minus the error over `error_scale`, at most `error_clip`. A filter that diverges costs `error_clip` in
       this step and in each epoch that is left, at once.
-    - `exclusion`: minus `exclusion_cost` where the decision was to exclude a clean fix: one that the receiver gives,
-      not spoofed and without multipath. Where single satellites of a clean fix are left out, this times their share of
-      those in view.
+    - `exclusion`: minus `exclusion_cost` if the decision was to exclude a clean fix: one that the receiver gives, not
+      spoofed and without multipath. If single satellites of a clean fix are left out, the cost is multiplied by their
+      share of those in view.
 
     `info["error"]` and `info["mean_error"]` are not clipped: report those.
 
     ## Starting State
 
-    The filter is warm, as in Spoofer-v0, and detectors remember a clean stretch without an alarm. `reset` ends after
-    the clean epoch 0, on which the first action decides. The opponent, its onset and the receiver's disturbances are
-    drawn at `reset`, from streams of their own. `reset` has no options.
+    The filter is warm, as in Spoofer-v0, and detectors remember clean epochs without an alarm. `reset` ends after the
+    clean epoch 0, on which the first action decides. The opponent, its onset and the receiver's disturbances are drawn
+    at `reset`, from streams of their own. `reset` has no options.
 
     ## Episode End
 
@@ -237,9 +244,9 @@ class DefenderEnv(SingleEnv):
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 
-    Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
-    valid. Numbers have limits far beyond what a game needs, so that nothing overflows and memory stays in bounds:
-    `error_scale` and `error_clip` lie from 1e-6 to 1e6, `exclusion_cost` is 1e6 at most.
+    Every argument is checked when the environment is built. A value that is not valid is refused; the error names the
+    argument and the valid values. Numbers have limits far beyond what a game needs, so that nothing overflows and
+    memory stays in bounds: `error_scale` and `error_clip` lie from 1e-6 to 1e6, `exclusion_cost` is 1e6 at most.
 
     `attacks` names who sits opposite in the games that are not clean:
 
@@ -253,10 +260,10 @@ class DefenderEnv(SingleEnv):
     | `"pool:ramp:0.5/direction=45+policy:runs/x,weights=2+1"` | such a pool in one word, for the command line |
 
     Within a `pool:` a part has `/` in place of its commas and `~` in place of `+`; a `policy:` keeps its slashes. A
-    learned spoofer sees what it was trained to see, by a shadow filter of its own; it plays from epoch 1 on. One that
-    needs what the game does not offer is refused when the game is built: other entries of its observation, the
-    statistics of a detector that is not among `detectors` (knowledge "full"), a scenario without a linear model
-    (knowledge "shadow" on most recorded logs).
+    learned spoofer sees what it was trained to see, by a shadow filter of its own, and plays from epoch 1 on. If it
+    needs what the game does not offer, it is refused when the game is built: other entries of its observation, the
+    statistics of a detector that is not among `detectors` (knowledge "full"), or a linear model that the scenario does
+    not have (knowledge "shadow" on most recorded logs).
 
     ## Rendering
 

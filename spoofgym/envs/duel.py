@@ -38,11 +38,12 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     ## Description
 
     Both agents act at every epoch, and the game ends for both together. The defender's decision is about the fix that
-    both have just seen; the spoofer's action is about the next one. The spoofer wants the navigation to err, the
-    defender wants the opposite: the game is zero-sum.
+    both have just seen. The spoofer's action is about the next one. The spoofer wants a large navigation error, the
+    defender a small one: the game is zero-sum.
 
-    In a share `clean` of the games nobody attacks. The spoofer's actions then do nothing, and no observation tells so:
-    the defender must not exclude GNSS lightly. In all other games the spoofer chooses when to begin, by its actions.
+    In a share `clean` of the games nobody attacks. The spoofer's actions then have no effect, and no observation shows
+    this: the defender must not exclude GNSS without a good reason. In all other games the spoofer chooses by its
+    actions when to begin.
     The receiver may also lose GNSS for a while or suffer multipath, as in Defender-v0.
 
     ```python
@@ -67,8 +68,8 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
 
     ## Observation Space
 
-    The spoofer sees what it sees in Spoofer-v0 with the same `knowledge`, `action`, `frames` and detectors; the
-    defender what it sees in Defender-v0 with the same detectors. The pages of both have the tables. With
+    The spoofer sees what it sees in Spoofer-v0 with the same `knowledge`, `action`, `frames` and detectors. The
+    defender sees what it sees in Defender-v0 with the same detectors. The pages of both have the tables. With
     `knowledge="full"` two entries follow those of Spoofer-v0 (in each frame):
 
     | Name | Unit | Scale |
@@ -84,7 +85,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     ## Rewards
 
     The harm of a game is the mean over its epochs of what the horizontal error of the estimate is worth, in real time:
-    recomputing past epochs does not mend what was put out then.
+    recomputing past epochs does not change the worth of their output.
 
     | `payoff` | What one epoch is worth | Harm |
     |---|---|---|
@@ -92,13 +93,13 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     | `"error:CAP"` | the error, m, at most CAP | mean error, m |
     | `"beyond:LIMIT"` | 1 where the error exceeds LIMIT, m, else 0 | share of epochs |
 
-    A step pays the spoofer what the epoch that it resolves adds to the harm, and the defender the opposite, so the
-    spoofer's return is the harm. A filter that diverges is worth the largest payoff in this epoch and in each that is
-    left, at once.
+    The spoofer's reward of a step is what the epoch that the step resolves adds to the harm. The defender's reward is
+    the negative of it. So the spoofer's return is the harm. If the filter diverges, this epoch and each that is left
+    are worth the largest payoff, at once.
 
     ## Starting State
 
-    As in Spoofer-v0 and Defender-v0: the filter is warm, and detectors remember a clean stretch without an alarm.
+    As in Spoofer-v0 and Defender-v0: the filter is warm, and detectors remember clean epochs without an alarm.
     `reset` ends after the clean epoch 0. The defender's first decision is about its fix, the spoofer's first action
     about that of epoch 1. `reset` ignores options.
 
@@ -141,8 +142,8 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 
-    Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
-    valid. So is a `tracking_time` without a `tracking_sigma`.
+    Every argument is checked when the environment is built. A value that is not valid is refused; the error names the
+    argument and the valid values. So is a `tracking_time` without a `tracking_sigma`.
 
     ## Rendering
 

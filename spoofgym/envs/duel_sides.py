@@ -57,7 +57,7 @@ class DuelSpooferEnv(_SideEnv):
 
     ## Arguments
 
-    Those of the duel, and
+    Those of the duel. In addition:
 
     | Name | Default | Meaning |
     |---|---|---|
@@ -117,7 +117,7 @@ class DuelDefenderEnv(_SideEnv):
     ## Arguments
 
     Those of the duel, without those of a spoofer outside (`knowledge`, `action`, `tracking_sigma`, `tracking_time`,
-    `frames`, `shadow`): the one inside brings its own. And
+    `frames`, `shadow`): the spoofer inside brings its own. In addition:
 
     | Name | Default | Meaning |
     |---|---|---|

@@ -15,24 +15,23 @@ class SpooferEnv(SingleEnv):
 
     ## Description
 
-    A vehicle navigates by an inertial navigation system and GNSS fixes, which a 15-state error-state Kalman filter
-    fuses. A spoofer, the agent, has taken the receiver over. At every fix (an epoch) it chooses how far the position
-    that the receiver reports lies from the true one. Fault detectors watch the filter's innovations: a fast drag-off
-    raises the alarm, a slow one moves the estimate little. The agent wants the largest horizontal error of the
-    estimate at the end of the game without an alarm on the way.
+    A vehicle navigates by an inertial navigation system and GNSS fixes. A 15-state error-state Kalman filter fuses
+    them. The agent is a spoofer who has taken over the receiver. At every fix (an epoch) it chooses how far the
+    reported position is from the true one. Fault detectors watch the filter's innovations: a fast drag-off raises the
+    alarm, and a slow one moves the estimate only a little. The agent wants the largest horizontal error of the
+    estimate at the end of the game, without an alarm before.
 
     The default scenario is the flight of Liu et al. (2018): 1 fix per second, 120 epochs from 801 s on, straight and
     level at 150 m/s, and a chi-square test of each fix with threshold 25.9. The best score there is known
     (`spoofgym.optimum`), so that a learned policy can be reported as a fraction of it.
 
-    On `song-robot` the filter is the credible one of a ground robot, which takes wheel encoders and yaw in beside the
-    fixes (`docs/reference/robot.md`). The robot knows its height, and only the horizontal error counts, there as
-    everywhere.
+    On `song-robot` the filter is the credible one of a ground robot, which also uses wheel encoders and yaw
+    (`docs/reference/robot.md`). The robot knows its height. As in every scenario, only the horizontal error counts.
 
     With `coupling="tight"` (`kujur-flight`, which is tight by itself, `liu-flight`, and logs of ranges) the filter
     takes the ranges to the satellites instead of fixes: code and carrier, or code and range rate. The spoofer then
-    moves all ranges as a receiver at the offset would see them, and pulls the receiver's clock as well. Only the
-    horizontal error is scored there, too: what becomes of the clock earns nothing, and a clock that jumps is seen.
+    moves all ranges as a receiver at the offset would see them, and pulls the receiver's clock as well. An error of
+    the clock earns nothing, and detectors see a clock that jumps.
 
     ```python
     import gymnasium
@@ -42,7 +41,7 @@ class SpooferEnv(SingleEnv):
 
     ## Action Space
 
-    `Box(-1.0, 1.0, (3,), float32)`, east, north, up; what lies outside is clipped.
+    `Box(-1.0, 1.0, (3,), float32)`, east, north, up; actions outside the box are clipped.
 
     - `action="rate"`: the rate at which the offset changes until the coming fix, one unit being the scenario's
       largest drag-off rate per axis (4 m/s on the Liu flight). The offset of a fix is that of the fix before plus
@@ -65,9 +64,9 @@ class SpooferEnv(SingleEnv):
 
     ## Observation Space
 
-    `Box(float32)` with the entries below. But for the elapsed fraction, a quantity x is squashed to y / (1 + |y|), y
-    = x / scale: an entry is a half where the quantity equals its scale, and tends to ±1 for large ones. The table is
-    that of `knowledge="shadow"`, 20 entries with fixes of position.
+    `Box(float32)` with the entries below. Every quantity x except the elapsed fraction is squashed to y / (1 + |y|),
+    y = x / scale: an entry is a half if the quantity equals its scale, and tends to ±1 for large quantities. The
+    table is that of `knowledge="shadow"`, 20 entries with fixes of position.
 
     | Index | Name | Min | Max | Unit | Scale |
     |---|---|---|---|---|---|
@@ -92,24 +91,24 @@ class SpooferEnv(SingleEnv):
     | 18 | mean velocity error north | -1 | 1 | m/s | 1 |
     | 19 | mean velocity error up | -1 | 1 | m/s | 1 |
 
-    - Offset: that the spoofer means to send in the present epoch. Tracked velocity: the vehicle's, as the spoofer
-      tracks it.
+    - Offset: the one that the spoofer means to send in the present epoch. Tracked velocity: that of the vehicle, as
+      the spoofer tracks it.
     - Mean entries: the victim's filter, or the one that `shadow` names, run in expectation (Liu's eqs 32-34), with
-      every fix used. "Last" is the present epoch, "coming" the next one if the offset stays as it is; the mean errors
-      are those after the present fix is used.
+      every fix used. "Last" is the present epoch, "coming" is the next one if the offset stays as it is. The mean
+      errors are those after the present fix is used.
     - `knowledge="blind"` has entries 0-7 only (8 entries).
     - `knowledge="full"` adds to the 20 the victim's own whitened innovation of the present epoch (entries 20-22,
       scale 2 sigma) and, for each detector, its statistic over its threshold (entry 23, scale 1) and its threshold
       (entry 24, scale 25): 25 entries with one detector, 2 more for each further one.
-    - Where the receiver gives velocity too (m = 6) every group of innovations has 6 entries instead of 3.
-    - With `coupling="tight"` two entries come in, so that there are 9, 22 and 27: "offset of the clock" (m, scale 10)
+    - If the receiver also gives velocity (m = 6), every group of innovations has 6 entries instead of 3.
+    - With `coupling="tight"` there are two more entries, 9, 22 and 27 in all: "offset of the clock" (m, scale 10)
       after "offset up", and "mean clock error" (m, scale 10) after "mean velocity error up". The innovations are those
-      of the ranges turned into a position (`Innovation.in_position`), whitened there: 3 entries, however many
-      satellites there are. A pull of the clock shows in them as far as the filter takes it for motion. In a slot where
-      a satellite rises the shadow filter's mean errors begin at zero.
-    - With `frames` above 1 the observation has the entries of that many epochs, one after the other: first those of
-      the present epoch, as above, then those of one epoch ago ("offset east, 1 epoch ago"), and so on. Epochs before
-      epoch 0 show what epoch 0 showed.
+      of the ranges turned into a position (`Innovation.in_position`), whitened there: 3 entries for any number of
+      satellites. They show a pull of the clock as far as the filter takes it for motion. When a satellite rises, the
+      shadow filter's mean errors of its slot begin at zero.
+    - With `frames` above 1 the observation has the entries of that many epochs in a row: first those of the present
+      epoch, as above, then those of one epoch ago ("offset east, 1 epoch ago"), and so on. Epochs before epoch 0 are
+      filled with the entries of epoch 0.
 
     `spoofgym.envs.observation.spoofer_fields` gives the same list in Python, `env.unwrapped.game.fields` that of an
     environment.
@@ -120,18 +119,18 @@ class SpooferEnv(SingleEnv):
     the sum of two terms, which `info["reward_terms"]` holds:
 
     - `growth`: growth of the error since the last step, over the scenario's `error_scale` (10 m on the Liu flight). A
-      step resolves the fix of the epoch before; the last step of an undetected game resolves its own, too.
-    - `forfeit`: at an alarm that ends the game, minus `forfeit` times all growth so far, that of this step included;
-      else 0. With `on_alarm="end"` a filter that diverges counts as an alarm.
+      step resolves the fix of the epoch before. The last step of an undetected game also resolves its own fix.
+    - `forfeit`: at an alarm that ends the game, minus `forfeit` times all growth so far, including that of this step;
+      otherwise 0. With `on_alarm="end"` a filter that diverges counts as an alarm.
 
     So with `forfeit=1.0` the return times `error_scale` is the error at the end minus that at the start if
     undetected, and 0 if detected.
 
     ## Starting State
 
-    The filter is warm: its covariance is that of its own recursion up to the onset of the attack, its true error is
-    drawn from the joint distribution of truth and filter there. Detectors remember a clean stretch without an alarm.
-    `reset` ends after the clean epoch 0 (800 s on the Liu flight), whose fix has not been used yet; the offset is 0.
+    The filter is warm: its covariance is that of its own recursion up to the onset of the attack, and its true error
+    is drawn from the joint distribution of truth and filter there. Detectors remember clean epochs without an alarm.
+    `reset` ends after the clean epoch 0 (800 s on the Liu flight), whose fix has not been used yet. The offset is 0.
     `reset` has no options.
 
     ## Episode End
@@ -149,8 +148,9 @@ class SpooferEnv(SingleEnv):
     - `alarm`: whether a detector alarms in this epoch (steps only).
     - `reward_terms`: `growth` and `forfeit` (steps only).
     - `kappa`: κ = σ_t² σ_s² of the present epoch, by axis `east`, `north` and `up` (steps with a `tracking_sigma`, σ_t,
-      only): variance that the tracking error adds to what the CPI of Kujur et al. (2024) sums, over that which it has;
-      1 / σ_s is the sigma of the position that the innovation asks for. Where κ is far below 1 the CPI has no power.
+      only): variance that the tracking error adds to the terms of the CPI of Kujur et al. (2024), relative to their
+      variance without it. 1 / σ_s is the sigma of the position as one innovation tells it. If κ is far below 1, the
+      CPI has no power.
     - `clock_error`: estimate minus truth of the receiver's clock when last resolved, m (`coupling="tight"` only).
     - `opponent`: name of the defender that the lane has drawn (where `response` is a pool only).
     - `outcome`: "diverged" if the filter diverged, "detected" if any alarm was raised in the game, else "undetected"
@@ -177,27 +177,27 @@ class SpooferEnv(SingleEnv):
     | `threads` | `1` | threads for slices of lanes; results do not depend on it |
     | `render_mode` | `None` | "human", "rgb_array" or "ansi", see Rendering below |
 
-    Every argument is checked when the environment is built: what is not valid is refused by its name, with what is
-    valid. So is one that would have no effect: a `response` without `on_alarm="respond"`, a `forfeit` with it, and a
-    `tracking_time` where no `tracking_sigma` is given. Numbers have limits far beyond what a game needs, so that
-    nothing overflows and memory stays in bounds: `frames` is 1000 at most, `tracking_sigma` 1e6 m, `forfeit` 1e6.
+    Every argument is checked when the environment is built. A value that is not valid is refused; the error names the
+    argument and the valid values. So is an argument that would have no effect: a `response` without
+    `on_alarm="respond"`, a `forfeit` with it, and a `tracking_time` without a `tracking_sigma`. Numbers have limits far
+    beyond what a game needs, so that nothing overflows and memory stays in bounds: `frames` is 1000 at most,
+    `tracking_sigma` 1e6 m, `forfeit` 1e6.
 
-    `tracking_sigma`: the spoofer knows the vehicle's position with this error per axis and epoch, which adds to the
-    offset that it means to send, and its velocity with an independent one over the interval. It changes what is sent
-    and seen, not how it is scored. Both are white, or with a `tracking_time` first-order Gauss-Markov. The offset of
-    the clock is sent as it is meant.
+    `tracking_sigma`: the spoofer knows the vehicle's position with this error per axis and epoch. The error adds to
+    the offset that it means to send. The spoofer knows the velocity with an independent error of this size, divided by
+    the interval. Both errors are white, or first-order Gauss-Markov with a `tracking_time`. They change what is sent
+    and seen, not how it is scored. The offset of the clock has no such error.
 
-    `shadow`: the spoofer who does not know the victim exactly. Its shadow filter, which makes the mean entries and
-    turns the "innovation" action into an offset, has the model of this scenario, e.g.
-    `shadow="liu-flight:imu=tactical"`; the victim, its detectors and the score stay those of `scenario`. Both must
-    have the same epochs, the same coupling and, if loose, the same dimension of the fix. A "blind" spoofer has no
-    shadow filter.
+    `shadow`: for a spoofer who does not know the victim exactly. Its shadow filter makes the mean entries and turns
+    the "innovation" action into an offset. It has the model of this scenario, e.g. `shadow="liu-flight:imu=tactical"`;
+    the victim, its detectors and the score stay those of `scenario`. Both must have the same epochs, the same coupling
+    and, if loose, the same dimension of the fix. A "blind" spoofer has no shadow filter.
 
-    `coupling` is written into the specifications of `scenario` and `shadow` where these have the option; a scenario
+    `coupling` is written into the specifications of `scenario` and `shadow` if they have the option. A scenario
     without it, or an object of the other coupling, is refused.
 
-    With `on_alarm="respond"` nothing is taken back: the return times `error_scale` is the growth of the error
-    whatever was detected. The shadow filter still assumes that every fix is used.
+    With `on_alarm="respond"` there is no forfeit: the return times `error_scale` is the growth of the error, whatever
+    was detected. The shadow filter still assumes that every fix is used.
 
     `response` names who sits opposite with `on_alarm="respond"`:
 
@@ -212,8 +212,8 @@ class SpooferEnv(SingleEnv):
 
     Within a `pool:` a part has `/` in place of its commas and `~` in place of `+`; a `policy:` keeps its slashes. The
     draw is seeded and independent of the number of lanes; `info["opponent"]` tells it. A learned defender sees what it
-    was trained to see. `detector` must therefore name the detectors that it was trained with, as they were spelled
-    then, and the scenario must have as many backtrack depths; else the game is refused when it is built.
+    was trained to see. So `detector` must name the detectors that it was trained with, as they were spelled then, and
+    the scenario must have as many backtrack depths. Otherwise the game is refused when it is built.
 
     ## Rendering
 

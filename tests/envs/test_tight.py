@@ -112,7 +112,7 @@ def test_an_innovation_cannot_be_chosen(scenario: str) -> None:
 @pytest.mark.parametrize(("knowledge", "place"), [("blind", 0), ("shadow", 1), ("full", 2)])
 def test_entries_of_the_spoofer_are_those_of_the_page(knowledge: str, place: int) -> None:
     env = SpooferEnv(scenario=KUJUR + ",drag_off_rate=4", knowledge=knowledge)
-    numbers = part_of_page(SpooferEnv, r"two entries come in, so that there are ([\d, and]+):")
+    numbers = part_of_page(SpooferEnv, r"there are two more entries, ([\d, and]+) in all:")
     assert env.observation_space.shape == (int(re.findall(r"\d+", numbers)[place]),)
     names = [field.name for field in env.game.fields]
     assert names[3] == "offset of the clock"
