@@ -54,7 +54,7 @@ def show(terminal: Console, what: RenderableType) -> None:
         if isinstance(part, Table):
             _show_table(terminal, part)
         else:
-            terminal.print(part)
+            terminal.print(part, soft_wrap=isinstance(part, str))  # a line of text is copied as one line
 
 
 def _show_table(terminal: Console, table: Table) -> None:

@@ -2,6 +2,10 @@
 
 A mistake of the user or a failure is told in one line on stderr. The exit status is 0, 2 where the arguments are wrong
 or ask for a filter that diverges, 1 where the work failed, and 130 after Ctrl-C. The library itself never calls this.
+
+Long work is a series of reports, each with more in it than the one before. Ctrl-C ends the series: what was there then
+is shown and written all the same, marked as incomplete (`last_of`, `end`). Work that keeps its parts in a folder says
+so instead, and the same command goes on there (`goes_on`).
 """
 
 from __future__ import annotations
@@ -10,16 +14,19 @@ import functools
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from spoofgym import files
 from spoofgym.patience import programs_are_ours
 
 FAILURE, USAGE, INTERRUPTED, CLOSED_PIPE = 1, 2, 130, 141
+COMPLETE = "complete"
+"""The key that a report has, with ``false``, where Ctrl-C came before its end."""
+Report = TypeVar("Report")
 
 
 class Program(Protocol):
@@ -98,9 +105,40 @@ def say(text: str) -> None:
     print(" ".join(text.split()), file=sys.stderr, flush=True)
 
 
+def incomplete(report: Mapping[str, Any]) -> dict[str, Any]:
+    """The report of work that was stopped."""
+    return {**report, COMPLETE: False}
+
+
+def last_of(reports: Iterable[Report], stopped: Callable[[Any], Any] = incomplete) -> Report:
+    """The last of a series of reports; where Ctrl-C ends the series, the last that was there, marked as incomplete.
+
+    Args:
+        reports: each has more in it than the one before; at least one.
+        stopped: marks a report as incomplete.
+
+    Raises:
+        KeyboardInterrupt: before there was any.
+    """
+    series, found = iter(reports), []
+    try:
+        for report in series:
+            found = [report]
+    except KeyboardInterrupt:
+        if not found:
+            raise
+        return stopped(found[0])
+    return found[0]
+
+
+def is_complete(report: Mapping[str, Any]) -> bool:
+    """Whether a report holds all that was asked for."""
+    return report.get(COMPLETE) is not False
+
+
 @contextmanager
-def kept(show: Callable[[], object]) -> Iterator[None]:
-    """Show what is there already when Ctrl-C ends a piece of work, and go on ending.
+def goes_on(folder: str | Path) -> Iterator[None]:
+    """Say after Ctrl-C that what is finished is kept in a folder, from which the same command goes on.
 
     Raises:
         KeyboardInterrupt: as it came.
@@ -108,13 +146,8 @@ def kept(show: Callable[[], object]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        show()
+        say(f"what is finished is kept in {folder}: the same command goes on")
         raise
-
-
-def goes_on(folder: str | Path) -> AbstractContextManager[None]:
-    """Say after Ctrl-C that what is finished is kept in a folder, from which the same command goes on."""
-    return kept(lambda: say(f"what is finished is kept in {folder}: the same command goes on"))
 
 
 def do_all(*steps: Callable[[], object]) -> None:

@@ -223,7 +223,7 @@ def _better(one: DefenceEpisodes, other: DefenceEpisodes) -> DefenceEpisodes:
     )
 
 
-def evaluate_defenders(
+def defenders_reports(
     scenario: Scenario,
     fidelity: str,
     policies: Sequence[LearnedDefender],
@@ -235,8 +235,10 @@ def evaluate_defenders(
     threads: int,
     progress: Progress = silent,
     log: GameLog | None = None,
-) -> dict[str, Any]:
-    """The ``"defenders"`` report: every defender against every population.
+) -> Iterator[dict[str, Any]]:
+    """The ``"defenders"`` report after every defender that has played; the last one has all, in every population.
+
+    Defenders are compared with each other when all have played in a population.
 
     Args:
         scenario: of the games.
@@ -264,7 +266,8 @@ def evaluate_defenders(
     if company == NOBODY and not given and not policies:
         raise ValueError("there is no defender to evaluate: name one")
     kinds: dict[str, str] = {}
-    report_rows, pairs, gaps, together = [], [], [], []
+    report_rows, pairs, gaps, together = (list[dict[str, Any]]() for _ in range(4))
+    one = {} if set(populations) <= set(POPULATIONS) else {"attack": populations[0]}
     for population in populations:
         held_out = POPULATIONS.get(population, False)
         pooled = f"all-{population}" if population in POPULATIONS else "all-games"
@@ -272,17 +275,18 @@ def evaluate_defenders(
             world = world_of(scenario, population, fidelity, threads, company.detectors, policies, given)
         check_policies(world, policies)
         games = Defenders(world, episodes, seed, progress)
-        played = list(games.play(company, given, policies))
-        learned = [item for item in played if item.kind == "learned"]
-        for item in played:
+        played = []
+        for item in games.play(company, given, policies):
+            played.append(item)
             kinds[item.name] = item.kind
             report_rows += rows(item, held_out, pooled)
             if log is not None:
                 log.note(item.name, population, mean_error_m=per_game(item), attack=attacks_of(item))
+            report = defenders_report(scenario, fidelity, dict(kinds), list(report_rows), list(pairs), list(gaps))
+            yield {**report, **one, "aggregates": list(together)}
+        learned = [item for item in played if item.kind == "learned"]
         together += aggregates(policies, learned, population)
         if learned:
             pairs += comparisons(learned, [item for item in played if item.kind != "learned"], held_out)
         gaps += gaps_of(played, held_out)
-    report = defenders_report(scenario, fidelity, kinds, report_rows, pairs, gaps)
-    one = {} if set(populations) <= set(POPULATIONS) else {"attack": populations[0]}
-    return {**report, **one, "aggregates": together}
+    yield {**defenders_report(scenario, fidelity, kinds, report_rows, pairs, gaps), **one, "aggregates": together}

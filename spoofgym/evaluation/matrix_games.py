@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,7 +98,18 @@ class Matrix:
         policies: Sequence[LearnedSpoofer],
         progress: Progress = silent,
     ) -> dict[str, Any]:
-        """The whole ``"matrix"`` report.
+        """The whole ``"matrix"`` report; arguments and errors as `reports`."""
+        *_, whole = self.reports(detectors, attacks, policies, progress)
+        return whole
+
+    def reports(
+        self,
+        detectors: Sequence[str],
+        attacks: Sequence[str],
+        policies: Sequence[LearnedSpoofer],
+        progress: Progress = silent,
+    ) -> Iterator[dict[str, Any]]:
+        """The ``"matrix"`` report after the clean games and after every attack; the last one is whole.
 
         Args:
             detectors: specifications; none = `DETECTORS`, and those that somebody else has registered.
@@ -118,13 +129,14 @@ class Matrix:
         with progress("thresholds"):
             ready = self._detectors(detectors or (*DETECTORS, *registered_by_others(KNOWN_DETECTORS)))
         clean = self._play(make_attack(CLEAN), ready, progress)
-        rows, curves = matrix_rows(ready, CLEAN, clean), []
+        common = (self.scenario, self.fidelity, self.arl0, self.episodes, ready)
+        rows, curves = matrix_rows(ready, CLEAN, clean), list[dict[str, Any]]()
         for attack in (*scripted, *(PolicySpoofer(policy) for policy in policies)):
+            yield {**matrix_report(*common, list(rows), list(curves)), "learned": []}
             games = self._play(attack, ready, progress)
             rows += matrix_rows(ready, attack.name, games)
             curves += detection_curves(ready, clean, attack.name, games)
-        report = matrix_report(self.scenario, self.fidelity, self.arl0, self.episodes, ready, rows, curves)
-        return {**report, "learned": seed_rows(rows, policies)}
+        yield {**matrix_report(*common, rows, curves), "learned": seed_rows(rows, policies)}
 
     def check_knowledge(self, policies: Sequence[LearnedSpoofer]) -> None:
         """Refuse policies that see the statistics of a detector.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,6 +44,13 @@ class CleanFigures:
 def evaluate_recorded(
     scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
 ) -> list[dict[str, Any]]:
+    """The rows of all attacks; arguments and errors as `recorded_rows`."""
+    return list(recorded_rows(scenario, attacks, detectors))
+
+
+def recorded_rows(
+    scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
+) -> Iterator[dict[str, Any]]:
     """Play every attack on the log, every fix used, and compare with the unspoofed run.
 
     Args:
@@ -51,7 +58,7 @@ def evaluate_recorded(
         attacks: in the order of the rows.
         detectors: each with its threshold set, or with one of its own; an alarm of any counts.
 
-    Returns:
+    Yields:
         A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
         detected, time_to_detect_s (from the attack's onset to the first alarm owed to it), error_at_detection_m,
         max_error_m (largest horizontal error after the onset), error_epochs (after the onset, whose error is known:
@@ -71,7 +78,8 @@ def evaluate_recorded(
         "clean_epochs": clean.epochs,
     }
     false = _clean_alarms(scenario, detectors)
-    return [{"attack": attack.name} | common | _play(scenario, attack, detectors, false) for attack in attacks]
+    for attack in attacks:
+        yield {"attack": attack.name} | common | _play(scenario, attack, detectors, false)
 
 
 def clean_figures(scenario: Scenario, detectors: Sequence[Detector]) -> CleanFigures:

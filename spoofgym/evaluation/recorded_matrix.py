@@ -7,7 +7,7 @@ several places of the log on, each a game of its own. All of it is measured on t
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -145,15 +145,17 @@ def play(scenario: Scenario, attack: Attack | None, detectors: Sequence[Detector
     return Course(np.array(time), np.array(statistics).T.reshape(len(detectors), -1), np.array(errors))
 
 
-def recorded_matrix(
+def recorded_matrices(
     scenario: Scenario,
     detectors: Sequence[Detector],
     attacks: Sequence[Attack],
     probability: float,
     games: int = GAMES,
     progress: Progress = silent,
-) -> dict[str, Any]:
-    """The ``"matrix"`` report of a log: every detector by itself against every attack.
+) -> Iterator[dict[str, Any]]:
+    """The ``"matrix"`` report of a log after the clean games and after every attack; the last one is whole.
+
+    Every detector plays by itself.
 
     An alarm is owed to an attack if the detector does not alarm at this epoch of the clean log.
 
@@ -177,15 +179,7 @@ def recorded_matrix(
     with progress("clean"):
         clean = [play(place, None, ready) for place in places]
     false = [course.statistic > thresholds[:, None] for course in clean]
-    rows = _rows(CLEAN, ready, clean, false)
-    for attack in attacks:
-        with progress(attack.name):
-            played = [play(place, copy.deepcopy(attack), ready) for place in places]
-        owed = [
-            (course.statistic > thresholds[:, None]) & ~alarms for course, alarms in zip(played, false, strict=True)
-        ]
-        rows += _rows(attack.name, ready, played, owed)
-    return {
+    head = {
         "schema_version": SCHEMA_VERSION,
         "kind": "matrix",
         "scenario": scenario.name,
@@ -197,11 +191,18 @@ def recorded_matrix(
             {"name": detector.name, "threshold": detector.threshold, "arl0": None, "arl0_ci95": None}
             for detector in ready
         ],
-        "rows": rows,
-        "curves": [],
-        "learned": [],
-        "left_out": list(refused.values()),
     }
+    tail: dict[str, Any] = {"curves": [], "learned": [], "left_out": list(refused.values())}
+    rows = _rows(CLEAN, ready, clean, false)
+    yield {**head, "rows": list(rows), **tail}
+    for attack in attacks:
+        with progress(attack.name):
+            played = [play(place, copy.deepcopy(attack), ready) for place in places]
+        owed = [
+            (course.statistic > thresholds[:, None]) & ~alarms for course, alarms in zip(played, false, strict=True)
+        ]
+        rows += _rows(attack.name, ready, played, owed)
+        yield {**head, "rows": list(rows), **tail}
 
 
 def starts(scenario: Scenario, detectors: Sequence[Detector], games: int) -> list[Scenario]:

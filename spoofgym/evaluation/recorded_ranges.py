@@ -8,7 +8,7 @@ over the drive plays them all.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import Fixes, interpolate, read_log
@@ -253,8 +254,12 @@ def _first_alarms(alarm: Flags, after: Floats, window: Flags) -> Floats:
     return np.where(alarm.any(axis=0), after[first, np.arange(alarm.shape[1])], np.nan)
 
 
-def side_by_side(path: str) -> dict[str, Any]:
-    """Play all filters on a log.
+def side_by_side(path: str, progress: Progress = silent) -> Iterator[dict[str, Any]]:
+    """Play all filters on a log: the report after each filter's games, the last one with all.
+
+    Args:
+        path: folder of the log.
+        progress: shows which filter plays.
 
     Raises:
         ValueError: no such log, no ranges in it, or a drive too short.
@@ -266,30 +271,32 @@ def side_by_side(path: str) -> dict[str, Any]:
     end = min(log.epoch_time[-1] for log in logs.values())
     onsets = game_onsets(fixes, begin, end)
     memory = max(make_detector(text).memory for text in DETECTORS.values())
-    whole = {}
+    whole, clean = {}, {}
     for name, scenario in scenarios.items():
         time = logs[name].epoch_time
         first = max(int(np.searchsorted(time, begin)), memory)
         whole[name] = scenario.changed(onset=float(time[first]), horizon=None)
-    clean = {name: play(scenario, 0.0, np.array([np.inf])) for name, scenario in whole.items()}
+        with progress(f"{name}, clean"):
+            clean[name] = play(whole[name], 0.0, np.array([np.inf]))
+    tight = logs["tight"]
+    assert isinstance(tight, RecordedRanges)
     filters, games = [], []
     for name, scenario in whole.items():
         shared = common(clean[name].time, [other.time for key, other in clean.items() if key != name])
         filters.append(clean_row(name, clean[name], errors(clean[name], fixes)[:, 0], shared))
         for rate in PULLS:
-            course = play(scenario, rate, onsets)
+            with progress(f"{name}, pulled at {rate:g} m/s"):
+                course = play(scenario, rate, onsets)
             games += pulled_rows(name, rate, onsets, course, errors(course, fixes), clean[name])
-    tight = logs["tight"]
-    assert isinstance(tight, RecordedRanges)
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "kind": "recorded-ranges",
-        "log": path,
-        "onsets_s": onsets.tolist(),
-        "clock": clock_drift(tight.epochs),
-        "clean": filters,
-        "pulled": games,
-    }
+        yield {
+            "schema_version": SCHEMA_VERSION,
+            "kind": "recorded-ranges",
+            "log": path,
+            "onsets_s": onsets.tolist(),
+            "clock": clock_drift(tight.epochs),
+            "clean": list(filters),
+            "pulled": list(games),
+        }
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from spoofgym.detectors import make_detector
@@ -15,10 +16,10 @@ from spoofgym.responses import make_response
 from spoofgym.scenario import Scenario
 
 
-def tuning_report(
+def tuning_reports(
     scenario: Scenario, episodes: int, seed: int, threads: int, progress: Progress = silent
-) -> dict[str, Any]:
-    """The ``"tuning"`` report: a row for each defender of the grid, the least mean error first.
+) -> Iterator[dict[str, Any]]:
+    """The ``"tuning"`` report after every defender of the grid: a row for each, the least mean error first.
 
     Args:
         scenario: of the games.
@@ -42,5 +43,5 @@ def tuning_report(
                 "clean_exclusion_fraction": score.clean_exclusion,
             }
         )
-    rows.sort(key=lambda row: float(row["mean_error_m"]))
-    return {"schema_version": SCHEMA_VERSION, "kind": "tuning", "scenario": scenario.name, "rows": rows}
+        ranked = sorted(rows, key=lambda row: float(row["mean_error_m"]))
+        yield {"schema_version": SCHEMA_VERSION, "kind": "tuning", "scenario": scenario.name, "rows": ranked}

@@ -9,7 +9,7 @@ the score with the right filter has a paired interval.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -153,30 +153,29 @@ def ratio_of_means(values: Floats, reference: Floats) -> tuple[float, tuple[floa
     return ratio, (ratio - half, ratio + half)
 
 
-def player_rows(name: str, play: Player, shadows: list[Shadow], progress: Progress = silent) -> list[dict[str, Any]]:
+def player_rows(
+    name: str, play: Player, shadows: list[Shadow], progress: Progress = silent
+) -> Iterator[dict[str, Any]]:
     """A spoofer with the right shadow filter, then with each wrong one."""
-    rows, right = [], None
+    right = None
     for shadow in [RIGHT, *shadows]:
         with progress(f"{name}, {shadow.label}"):
             result = play(shadow)
         errors = undetected_error(result.episodes)
         right = errors if right is None else right
         score, fraction = attacker_score(result.episodes), ratio_of_means(errors, right)
-        rows.append(
-            {
-                "attacker": name,
-                "shadow": shadow.label,
-                "shadow_scenario": shadow.scenario,
-                "episodes": score.episodes,
-                "mean_undetected_error_m": score.mean_undetected_error,
-                "ci95_m": list(score.interval),
-                "exact_undetected_error_m": result.exact,
-                "detection_probability": score.detection_probability,
-                "fraction_of_right": None if fraction is None else fraction[0],
-                "fraction_ci95": None if fraction is None else list(fraction[1]),
-            }
-        )
-    return rows
+        yield {
+            "attacker": name,
+            "shadow": shadow.label,
+            "shadow_scenario": shadow.scenario,
+            "episodes": score.episodes,
+            "mean_undetected_error_m": score.mean_undetected_error,
+            "ci95_m": list(score.interval),
+            "exact_undetected_error_m": result.exact,
+            "detection_probability": score.detection_probability,
+            "fraction_of_right": None if fraction is None else fraction[0],
+            "fraction_ci95": None if fraction is None else list(fraction[1]),
+        }
 
 
 def check_policies(evaluation: Evaluation, policies: list[LearnedSpoofer]) -> None:
@@ -192,10 +191,10 @@ def check_policies(evaluation: Evaluation, policies: list[LearnedSpoofer]) -> No
     evaluation.check_layouts(policies)
 
 
-def wrong_shadow_report(
+def wrong_shadow_reports(
     evaluation: Evaluation, threshold: float, policies: list[LearnedSpoofer], progress: Progress = silent
-) -> dict[str, Any]:
-    """The ``"wrong-shadow"`` report.
+) -> Iterator[dict[str, Any]]:
+    """The ``"wrong-shadow"`` report after every row.
 
     Args:
         evaluation: of the victim, whose only detector is a snapshot test.
@@ -206,11 +205,15 @@ def wrong_shadow_report(
     scenario, shadows = evaluation.scenario, wrong_shadows(evaluation.scenario)
     players = [(policy.name, policy_player(evaluation, policy)) for policy in policies]
     players.append(("optimum", optimum_player(evaluation, threshold)))
-    return {
+    head = {
         "schema_version": SCHEMA_VERSION,
         "kind": "wrong-shadow",
         "scenario": scenario.name,
         "fidelity": evaluation.fidelity,
         "detector": detector_entry(evaluation.detectors, scenario),
-        "rows": [row for name, play in players for row in player_rows(name, play, shadows, progress)],
     }
+    rows: list[dict[str, Any]] = []
+    for name, play in players:
+        for row in player_rows(name, play, shadows, progress):
+            rows.append(row)
+            yield {**head, "rows": list(rows)}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from spoofgym.evaluation.game_trace import KIND as GAME
 from spoofgym.evaluation.game_trace import GameTrace
+from spoofgym.program import is_complete
 from spoofgym.report.attackers import attackers_sections, recorded_sections
 from spoofgym.report.benchmarks import benchmark_sections
 from spoofgym.report.bounds import bayesian_sections, duel_sections
@@ -40,7 +42,7 @@ VIEWS: dict[str, Callable[[Report], list[Section]]] = {
     **dict.fromkeys(
         (
             *("tuning", "thresholds", "fidelity of thresholds", "acna-study", "wrong-shadow", "reproduction"),
-            *("recorded-ranges", "references"),
+            *("recorded-ranges", "references", "self-tuning-study", "patient-spoofer", "agents"),
         ),
         plain_section,
     ),
@@ -162,9 +164,13 @@ def report_sections(report: Report, beside: Sequence[Report] = ()) -> list[Secti
     """
     kind = report["kind"]
     try:
-        if kind == "defenders":
-            return defenders_sections(report, beside)
-        return VIEWS[kind](report)
+        sections = defenders_sections(report, beside) if kind == "defenders" else VIEWS[kind](report)
+        return sections if is_complete(report) else [_marked(section) for section in sections]
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"a damaged report of kind {shown(kind)}: {type(error).__name__}: {reason}") from error
+
+
+def _marked(section: Section) -> Section:
+    """The section of a report whose program was stopped: it says so first."""
+    return replace(section, facts=[("incomplete", "its program was stopped before its end"), *section.facts])

@@ -11,7 +11,7 @@ from spoofgym.report.figures import Section, TableFigure
 Report = Mapping[str, Any]
 INTERVAL = "ci95"
 NAMES = {"arl0": "ARL₀, epochs", "episodes": "Games of each", "games": "Games of each"}
-UNTOLD = ("schema_version", "kind", "rows")
+UNTOLD = ("schema_version", "kind", "rows", "complete")
 
 
 def table_of(title: str, summary: str, rows: Sequence[Mapping[str, Any]]) -> TableFigure:

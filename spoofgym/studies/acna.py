@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,8 @@ import numpy as np
 from spoofgym import files, validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks import make_attack
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, add_threads, count
+from spoofgym.console import console
 from spoofgym.detectors.acna import (
     SONG_JUMP_EPOCHS,
     SONG_JUMP_THRESHOLD,
@@ -33,15 +35,17 @@ from spoofgym.detectors.acna import (
     gnss_drift,
 )
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.progress import Progress
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.figures import new_figure
 from spoofgym.navigation.facts import ODOMETER
 from spoofgym.navigation.interface import Demands, Epoch
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.responses.exclude import Exclude
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.streams import RunStreams
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym study acna --runs 10",
@@ -125,7 +129,9 @@ class OneTest(Detector):
         return (mean >= self._thresholds).astype(np.float64)
 
 
-def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, seed: int) -> Rates:
+def play(
+    scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, seed: int, num_threads: int = 1
+) -> Rates:
     """Rates of pairs of window and threshold on the attack that a test is for; all pairs meet the same noise.
 
     Args:
@@ -135,6 +141,7 @@ def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, 
         thresholds: Th of each pair, (P,), m.
         runs: per pair.
         seed: of run 0.
+        num_threads: that simulate.
 
     Raises:
         ValueError: the scenario has no odometer, or there is no run.
@@ -152,6 +159,7 @@ def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, 
             Exclude(),
             pairs,
             streams=RunStreams([parent] * pairs),
+            threads=num_threads,
         )
         simulation.reset()
         for _ in range(simulation.scenario.timeline.num_epochs):
@@ -169,10 +177,10 @@ def play(scenario: str, test: str, epochs: Runs, thresholds: Floats, runs: int, 
     return Rates(right / (clean + spoofed), false / clean, missed / spoofed)
 
 
-def study(scenario: str, test: str, runs: int, seed: int) -> Rates:
+def study(scenario: str, test: str, runs: int, seed: int, num_threads: int = 1) -> Rates:
     """Rates on the whole grid, (windows, thresholds); arguments and errors as `play`."""
     windows, levels = np.meshgrid(EPOCHS, THRESHOLDS[test], indexing="ij")
-    rates = play(scenario, test, windows.ravel(), levels.ravel(), runs, seed)
+    rates = play(scenario, test, windows.ravel(), levels.ravel(), runs, seed, num_threads)
     return Rates(*(part.reshape(windows.shape) for part in (rates.accuracy, rates.false_alarm, rates.missed)))
 
 
@@ -240,51 +248,42 @@ def parser() -> argparse.ArgumentParser:
     add("--scenario", default="song-robot", help="with an odometer (default: %(default)s)")
     add("--runs", type=count, default=10, help="per pair (default: %(default)s)")
     add_seed(result, "run 0")
+    add_threads(result)
     add_json(result)
     add_figure(result)
     return result
 
 
-def _report(scenario: str, runs: int, seed: int, grids: dict[str, Rates]) -> dict[str, Any]:
-    """The ``"acna-study"`` report: the rows of both tests."""
-    found = []
-    for test, grid in grids.items():
+def _reports(
+    scenario: str, runs: int, seed: int, num_threads: int, grids: dict[str, Rates], progress: Progress
+) -> Iterator[dict[str, Any]]:
+    """The ``"acna-study"`` report after each test, whose rates are put into ``grids``."""
+    head = {"schema_version": SCHEMA_VERSION, "kind": "acna-study", "scenario": scenario, "runs": runs, "seed": seed}
+    found: list[dict[str, Any]] = []
+    for test in TESTS:
         window, level = PUBLISHED[test]
-        found += rows(test, grid, play(scenario, test, np.array([window]), np.array([level]), runs, seed))
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "kind": "acna-study",
-        "scenario": scenario,
-        "runs": runs,
-        "seed": seed,
-        "rows": found,
-    }
+        with progress(f"{test} test"):
+            grids[test] = study(scenario, test, runs, seed, num_threads)
+            published = play(scenario, test, np.array([window]), np.array([level]), runs, seed, num_threads)
+        found += rows(test, grids[test], published)
+        yield {**head, "rows": list(found)}
 
 
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    common = (options.runs, options.seed)
-    grids = {test: study(options.scenario, test, *common) for test in TESTS}
-    report = _report(options.scenario, *common, grids)
-    out = sys.stderr if options.json == STDOUT else sys.stdout
+    terminal = console(stderr=options.json == STDOUT)
+    grids: dict[str, Rates] = {}
+    games = (options.runs, options.seed, options.threads)
+    report = last_of(_reports(options.scenario, *games, grids, terminal.status))
     lines = [
         f"{options.scenario}, {options.runs} runs per pair from seed {options.seed}\n",
         "| test | pair | threshold, m | accuracy | false alarms | missed |",
         "|---|---|---|---|---|---|",
         *map(_line, report["rows"]),
     ]
-    steps: list[Callable[[], object]] = [
-        lambda: print("\n".join(lines), file=out),
-        lambda: give_json(report, options.json),
-    ]
-    if options.figure is not None:
-        steps.append(lambda: draw(grids, options.figure))
-    do_all(*steps)
-    for what, path in (("rows", options.json), ("figure", options.figure)):
-        if path is not None and path != STDOUT:
-            print(f"{what} in {path}", file=out)
+    give(report, "\n".join(lines), options.json, terminal, [("figure", options.figure, partial(draw, grids))])
     return 0
 
 

@@ -14,18 +14,23 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
-from spoofgym.command_line import Parser, add_import, count, output
-from spoofgym.console import console, show
+from spoofgym.command_line import STDOUT, Parser, add_import, add_json, count, output
+from spoofgym.console import console
 from spoofgym.evaluation.agent_scores import agent_scores
+from spoofgym.evaluation.progress import Progress
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.policies.card import Card, Score, read_card
 from spoofgym.policies.learned import load_policy
 from spoofgym.policies.published import policy_folder, published_names
-from spoofgym.program import FAILURE, moved, program
+from spoofgym.program import FAILURE, last_of, moved, program
+from spoofgym.studies.giving import give
 from spoofgym.studies.pages import put_table
 
 EXAMPLES = (
@@ -46,6 +51,7 @@ def parser() -> argparse.ArgumentParser:
     add("--games", type=count, help="with --check: against each opponent (default: as many as the card tells)")
     add("--write", metavar="FILE", type=output, help="page whose table is replaced, between its two marks")
     add_import(result)
+    add_json(result)
     return result
 
 
@@ -56,28 +62,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = options.agents or published_names()
     if not names:
         raise ValueError("this version publishes no agents: name the folder of one")
-    terminal = console()
+    terminal = console(stderr=options.json == STDOUT)
     cards = {name: read_card(policy_folder(name)) for name in names}
     if options.write is not None:
         write_table(options.write, list(cards.values()))
-    failed = []
-    table = Table(box=None)
-    for column in (*COLUMNS, *(("played again",) if options.check else ())):
-        table.add_column(column)
+    report = last_of(_reports(cards, options.check, options.games, terminal.status))
+    give(report, _table(report, options.check), options.json, terminal)
+    return FAILURE if any(row["holds"] is False for row in report["rows"]) else 0
+
+
+def _reports(
+    cards: dict[str, Card], again: bool, games: int | None, progress: Progress
+) -> Iterator[dict[str, Any]]:
+    """The ``"agents"`` report after each agent: a row for each score of its card."""
+    rows: list[dict[str, Any]] = []
     for name, card in cards.items():
-        again: Sequence[Score | None] = [None] * len(card.scores)
-        if options.check:
-            with terminal.status(f"{name} plays"):
-                again = played_again(name, card, options.games)
-        for told, found in zip(card.scores, again, strict=True):
-            row = list(_row(card, told))
-            if found is not None:
-                holds = overlap(told, found)
-                row.append(f"{shown(found)}{'' if holds else ', does not hold'}")
-                failed += [] if holds else [name]
-            table.add_row(*row)
-    show(terminal, table)
-    return FAILURE if failed else 0
+        played: Sequence[Score | None] = [None] * len(card.scores)
+        if again:
+            with progress(f"{name} plays"):
+                played = played_again(name, card, games)
+        for told, found in zip(card.scores, played, strict=True):
+            rows.append(
+                {
+                    **dict(zip(COLUMNS, _row(card, told), strict=True)),
+                    "card": asdict(told),
+                    "again": None if found is None else asdict(found),
+                    "holds": None if found is None else overlap(told, found),
+                }
+            )
+        yield {"schema_version": SCHEMA_VERSION, "kind": "agents", "rows": list(rows)}
+
+
+def _table(report: dict[str, Any], again: bool) -> Table:
+    table = Table(box=None)
+    for column in (*COLUMNS, *(("played again",) if again else ())):
+        table.add_column(column)
+    for row in report["rows"]:
+        cells = [row[column] for column in COLUMNS]
+        if row["again"] is not None:
+            cells.append(f"{shown(Score(**row['again']))}{'' if row['holds'] else ', does not hold'}")
+        table.add_row(*cells)
+    return table
 
 
 def played_again(name: str, card: Card, games: int | None = None) -> tuple[Score, ...]:

@@ -19,7 +19,7 @@ from rich.console import Group
 from rich.table import Table
 
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, count, run_folder, share
-from spoofgym.console import console, show
+from spoofgym.console import console
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.evaluation.bayesian_bound import DEPTH, BoundSettings, bound_games, bound_report, same_games
 from spoofgym.evaluation.defenders import fits
@@ -28,8 +28,9 @@ from spoofgym.evaluation.engine import make_engine
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.optimum.bayes import POPULATION_SHAPES, RESOLUTIONS
 from spoofgym.policies.classical import SEPARATOR, WORLD_DETECTORS, tuned_for
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import goes_on, moved, program
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym bound bayes --scenario foi-drive --population training",
@@ -82,10 +83,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     duel = with_detectors_of(duel, defenders)
     engine, notify = make_engine("processes", options.workers), partial(console(stderr=True).print, soft_wrap=True)
     rows = []
-    for population in options.population or ["training"]:
-        settings = BoundSettings(duel, population, options.games, options.seed, RESOLUTIONS[options.resolution])
-        games = bound_games(settings, options.out / "bayesian", engine, notify)
-        rows.append(bound_report(settings, games, same_games(settings, defenders, options.out / "cells")))
+    with goes_on(options.out):
+        for population in options.population or ["training"]:
+            settings = BoundSettings(duel, population, options.games, options.seed, RESOLUTIONS[options.resolution])
+            games = bound_games(settings, options.out / "bayesian", engine, notify)
+            rows.append(bound_report(settings, games, same_games(settings, defenders, options.out / "cells")))
     report = {
         "schema_version": SCHEMA_VERSION,
         "kind": "bayesian-bound",
@@ -96,8 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "resolution": options.resolution,
         "rows": rows,
     }
-    output = console(stderr=options.json == STDOUT)
-    do_all(lambda: show(output, Group(*bound_tables(report))), lambda: give_json(report, options.json))
+    give(report, Group(*bound_tables(report)), options.json, console(stderr=options.json == STDOUT))
     return 0
 
 

@@ -22,6 +22,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rich.console import Group
 from rich.table import Table
 
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, count, output, run_folder
@@ -32,7 +33,7 @@ from spoofgym.evaluation.benchmark_report import measure, references
 from spoofgym.evaluation.benchmark_v1 import V1
 from spoofgym.evaluation.engine import Engine, Notify, make_engine
 from spoofgym.evaluation.report import SCHEMA_VERSION
-from spoofgym.program import FAILURE, do_all, give_json, goes_on, moved, program
+from spoofgym.program import FAILURE, goes_on, moved, program
 from spoofgym.studies.benchmark_page import page_results, write_rows
 from spoofgym.studies.benchmark_presentation import (
     agrees,
@@ -43,6 +44,7 @@ from spoofgym.studies.benchmark_presentation import (
     report_tables,
     write_page,
 )
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym benchmark attack ramp:0.5",
@@ -92,12 +94,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     engine = make_engine("processes", options.workers)
     matches = Matches(V1, options.out / "cells")
     notify = partial(console(stderr=True).print, soft_wrap=True)
-    if options.command == TABLE:
-        return _table(options, matches, engine, notify)
-    asked = [name for text in options.tasks for name in text.split(",")]
-    if options.command == REFERENCES:
-        return _references(options, matches, asked, engine, notify)
     with goes_on(options.out):
+        if options.command == TABLE:
+            return _table(options, matches, engine, notify)
+        asked = [name for text in options.tasks for name in text.split(",")]
+        if options.command == REFERENCES:
+            return _references(options, matches, asked, engine, notify)
         report = measure(matches, options.command, options.policies, asked, engine, notify)
     _give(report_tables(report), report, options.json)
     return 0
@@ -135,8 +137,7 @@ def _table(options: argparse.Namespace, matches: Matches, engine: Engine, notify
 
 
 def _give(tables: Sequence[Table], report: dict[str, Any], destination: Any) -> None:
-    terminal = console(stderr=destination == STDOUT)
-    do_all(*(partial(show, terminal, table) for table in tables), lambda: give_json(report, destination))
+    give(report, Group(*tables), destination, console(stderr=destination == STDOUT))
 
 
 if __name__ == "__main__":

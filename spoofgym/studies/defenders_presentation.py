@@ -62,9 +62,9 @@ def defenders_tables(report: dict[str, Any]) -> Group:
             parts += [_table(title, "defender", pooled, learned), ""]
         if pooled and learned:
             by_attack = [row for row in of_set if row["defender"] == learned[0] and not _is_pooled(row)]
-            parts += [_table(f"{learned[0]} by attack: {attacks}", "attack", by_attack, []), ""]
+            parts += [_table(f"{learned[0]} by attack: {attacks}", "attack", by_attack, []), ""] if by_attack else []
     parts += [Text(LEGEND, style="dim italic"), ""]
-    if learned:
+    if report["comparisons"]:
         parts += [_comparisons(report, learned), ""]
     if report["gaps"]:
         parts += [_gaps(report)]
@@ -101,7 +101,8 @@ def _comparisons(report: dict[str, Any], learned: list[str]) -> Table:
     if len(learned) > 1:
         table.caption += f"; better: so many of the {len(learned)}, each by itself"
     table.caption_justify = "left"
-    present = [held_out for held_out in POPULATIONS if any(item["held_out"] == held_out for item in report["rows"])]
+    compared = {item["held_out"] for item in report["comparisons"]}
+    present = [held_out for held_out in POPULATIONS if held_out in compared]
     table.add_column("baseline", overflow="fold")
     for held_out in present:
         table.add_column(POPULATIONS[held_out], justify="right", no_wrap=True)

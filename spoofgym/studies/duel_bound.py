@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rich.table import Table
 
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, count, share
-from spoofgym.console import console, show
+from spoofgym.console import console
 from spoofgym.envs.payoffs import Beyond, make_payoff
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.optimum.gaussian_spoofer import Loss, LowerBound, beyond_loss, error_loss, lower_bound
 from spoofgym.optimum.pull_process import drift_pull, unseen_pull
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym bound duel --scenario foi-drive",
@@ -68,11 +70,15 @@ def loss_of(payoff: str, scenario: Scenario) -> Loss:
 
 
 def bounds(
-    model: LinearModel, losses: dict[str, Loss], clean: float, games: int, seed: int
-) -> dict[str, LowerBound]:
-    """The lower bound of each payoff, by its name, against the pulls of this program."""
+    model: LinearModel, losses: dict[str, Loss], clean: float, games: int, seed: int, progress: Progress = silent
+) -> Iterator[dict[str, LowerBound]]:
+    """The lower bounds against the pulls of this program, by their payoffs, after each of these."""
     pulls = [*(drift_pull(model, scale) for scale in DRIFTS), *(unseen_pull(model, scale) for scale in UNSEEN)]
-    return {name: lower_bound(model, loss, pulls, clean, games, seed) for name, loss in losses.items()}
+    found: dict[str, LowerBound] = {}
+    for name, loss in losses.items():
+        with progress(f"payoff {name}"):
+            found[name] = lower_bound(model, loss, pulls, clean, games, seed)
+        yield dict(found)
 
 
 @program
@@ -83,11 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scenario = make_scenario(options.scenario)
     scenario.facts.require("the bound of a duel", (INERTIAL_SOLUTION, LINEAR_MODEL))
     losses = {payoff: loss_of(payoff, scenario) for payoff in options.payoff or ["error"]}
-    with terminal.status(f"{scenario.name}: drawing games"):
-        found = bounds(scenario.linear_model(), losses, options.clean, options.games, options.seed)
-    report = bound_report(scenario, found, options.clean, options.games, options.seed)
-    table = bound_table(report)
-    do_all(lambda: show(terminal, table), lambda: give_json(report, options.json))
+    games = (options.clean, options.games, options.seed)
+    series = bounds(scenario.linear_model(), losses, *games, terminal.status)
+    report = last_of(bound_report(scenario, found, *games) for found in series)
+    give(report, bound_table(report), options.json, terminal)
     return 0
 
 

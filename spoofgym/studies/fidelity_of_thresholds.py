@@ -11,35 +11,46 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from spoofgym.calibration import calibrated_all
 from spoofgym.calibration.clean_statistics import joint_statistics
 from spoofgym.calibration.thresholds import Calibration, measure_together
-from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json, add_seed, count, threads
+from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json, add_seed, add_threads, count
+from spoofgym.console import console
 from spoofgym.detectors import at_arl0, make_detector
 from spoofgym.detectors.base import Detector, require_threshold
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym study fidelity-of-thresholds --scenario liu-flight --arl0 1e3 1e4",
 )
 
+KIND = "fidelity of thresholds"
 NEEDING_SIMULATION = ("acceleration", "bias-range", "growing-window", "relative-motion")
 """They look at the run, and not only at its innovations: no white noise calibrates them."""
 
 
 def rows(
-    scenario: Scenario, detectors: Sequence[str], arl0s: Sequence[float], epochs: float, seed: int, num_threads: int
-) -> list[dict[str, Any]]:
+    scenario: Scenario,
+    detectors: Sequence[str],
+    arl0s: Sequence[float],
+    epochs: float,
+    seed: int,
+    num_threads: int,
+    progress: Progress = silent,
+) -> Iterator[list[dict[str, Any]]]:
     """A row for each detector and ARL₀: the linear threshold, and its ARL₀ in each fidelity.
 
-    Detectors that look back equally far share clean runs.
+    Detectors that look back equally far share clean runs. The rows come after each of these groups; the last time all
+    are there.
 
     Args:
         scenario: with both fidelities.
@@ -48,6 +59,7 @@ def rows(
         epochs: clean ones per detector and fidelity, at least.
         seed: of the clean runs.
         num_threads: that simulate.
+        progress: shows what is measured.
 
     Raises:
         ValueError: a detector that is unknown or does not fit the scenario, or a scenario without both fidelities.
@@ -60,15 +72,16 @@ def rows(
     found: dict[int, dict[str, Any]] = {}
     for places in groups.values():
         group = [ready[place] for place in places]
-        measured = {
-            fidelity: _measured(scenario, fidelity, group, epochs, seed, num_threads) for fidelity in FIDELITIES
-        }
+        with progress(", ".join(dict.fromkeys(specifications[place][0] for place in places))):
+            measured = {
+                fidelity: _measured(scenario, fidelity, group, epochs, seed, num_threads) for fidelity in FIDELITIES
+            }
         for number, place in enumerate(places):
             text, arl0 = specifications[place]
             found[place] = {"detector": text, "asked_arl0": arl0, "threshold": ready[place].threshold}
             for fidelity, (results, seconds) in measured.items():
                 found[place][fidelity] = _cells(results[number], seconds)
-    return [found[place] for place in range(len(ready))]
+        yield [found[place] for place in sorted(found)]
 
 
 def _measured(
@@ -113,7 +126,7 @@ def parser() -> argparse.ArgumentParser:
     add("--arl0", type=above_one, nargs="+", default=[1e3], help="epochs (default: 1e3)")
     add("--epochs", type=count, default=1_000_000, help="clean ones of each fidelity (default: %(default)s)")
     add_seed(result, "the clean runs", 7)
-    add("--threads", type=threads, default=1, help="that simulate (default: %(default)s)")
+    add_threads(result)
     add_import(result)
     add_json(result)
     return result
@@ -125,11 +138,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     scenario = make_scenario(options.scenario)
     detectors = options.detector or NEEDING_SIMULATION
-    table = rows(scenario, detectors, options.arl0, options.epochs, options.seed, options.threads)
-    kind = "fidelity of thresholds"
-    report = {"schema_version": SCHEMA_VERSION, "kind": kind, "scenario": scenario.name, "rows": table}
-    out = sys.stderr if options.json == STDOUT else sys.stdout
-    do_all(lambda: print("\n".join(map(_line, table)), file=out), lambda: give_json(report, options.json))
+    terminal = console(stderr=options.json == STDOUT)
+    games = (options.epochs, options.seed, options.threads)
+    series = rows(scenario, detectors, options.arl0, *games, terminal.status)
+    head: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "kind": KIND, "scenario": scenario.name}
+    report = last_of({**head, "rows": found} for found in series)
+    give(report, "\n".join(map(_line, report["rows"])), options.json, terminal)
     return 0
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,20 +23,22 @@ from scipy import special
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
-from spoofgym.console import console, show
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.kujur_monitor import KujurMonitor
 from spoofgym.detectors.separation_bank import DEFAULT_P_MD, SeparationBank
 from spoofgym.evaluation.integrity import Integrity, integrity
+from spoofgym.evaluation.progress import Progress
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.navigation.tight.shared_gains import TightNavigator
-from spoofgym.program import do_all, give_json, kept, moved, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.tracking import draw_tracking_error
 from spoofgym.simulation import Simulation
 from spoofgym.specification import spell
+from spoofgym.studies.giving import Output, give
 from spoofgym.studies.stanford import draw_side_by_side
 
 EXAMPLES = (
@@ -281,19 +283,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
     replicas = REPLICAS if options.climb is None else (CLEAN, *map(Replica, options.climb))
     drawn = SLOW if options.climb is None else replicas[-1]
     terminal = console(stderr=options.json == STDOUT)
-    rows: list[dict[str, Any]] = []
-    with kept(lambda: show(terminal, table_of(report(scenario, rows, runs, options.seed)))):
-        for replica in replicas:
-            with terminal.status(replica.words):
-                flight = play(replica, runs, options.seed, scenario, threads=options.threads)
-            for user, level in flight.level.items():
-                named = {"signals": replica.words, "user": user, "level_m": float(np.median(level))}
-                rows.append({**named, **flight.result(user).content()})
-            if replica == drawn and options.figure is not None:
-                draw(flight, replica, options.figure)
-    found = report(scenario, rows, runs, options.seed)
-    do_all(lambda: show(terminal, table_of(found)), lambda: give_json(found, options.json))
+    kept: list[Flight] = []
+    games = (runs, options.seed, options.threads)
+    found = last_of(_reports(scenario, replicas, *games, terminal.status, drawn, kept))
+    outputs: list[Output] = [("figure", options.figure, lambda path: draw(kept[0], drawn, path))]
+    give(found, table_of(found), options.json, terminal, outputs)
     return 0
+
+
+def _reports(
+    scenario: Scenario,
+    replicas: Sequence[Replica],
+    runs: int,
+    seed: int,
+    threads: int,
+    progress: Progress,
+    drawn: Replica,
+    kept: list[Flight],
+) -> Iterator[dict[str, Any]]:
+    """The report after every replica; the flight of the one that is drawn is kept."""
+    rows: list[dict[str, Any]] = []
+    for replica in replicas:
+        with progress(replica.words):
+            flight = play(replica, runs, seed, scenario, threads=threads)
+        kept += [flight] if replica == drawn else []
+        for user, level in flight.level.items():
+            named = {"signals": replica.words, "user": user, "level_m": float(np.median(level))}
+            rows.append({**named, **flight.result(user).content()})
+        yield report(scenario, list(rows), runs, seed)
 
 
 def report(scenario: Scenario, rows: list[dict[str, Any]], runs: int, seed: int) -> dict[str, Any]:

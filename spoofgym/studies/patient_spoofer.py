@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +20,21 @@ from spoofgym import files, validation
 from spoofgym.arrays import Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import EAST, heading
-from spoofgym.command_line import Parser, add_figure, add_seed, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, add_threads, count
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.metrics import mean_interval
+from spoofgym.evaluation.progress import Progress
+from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.figures import new_figure
 from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Clock
-from spoofgym.program import moved, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.specification import spell
+from spoofgym.studies.giving import Output, give
 
 SCENARIO = "liu-flight:horizon=150,imu=tactical"
 DETECTOR = "snapshot"
@@ -111,11 +117,17 @@ class Course:
     reset: Floats
 
 
-def play(response: str, runs: int, seed: int) -> Course:
+def play(response: str, runs: int, seed: int, num_threads: int = 1) -> Course:
     """Runs of the spoofer against a response; run i is seeded ``seed + i``, whatever the response."""
     scenario = make_scenario(SCENARIO)
     simulation = Simulation(
-        scenario, PatientSpoofer(onset=ONSET), [make_detector(DETECTOR)], make_response(response), runs, seed
+        scenario,
+        PatientSpoofer(onset=ONSET),
+        [make_detector(DETECTOR)],
+        make_response(response),
+        runs,
+        seed,
+        threads=num_threads,
     )
     simulation.reset()
     error, used, reset = [], [], []
@@ -132,20 +144,31 @@ def play(response: str, runs: int, seed: int) -> Course:
     return Course(time[after], *(np.array(rows).T[:, after] for rows in (error, used, reset)))
 
 
-def row(response: str, course: Course) -> str:
-    """One line of the table."""
-    final = course.error[:, -1]
-    low, high = mean_interval(final)
-    taken = course.reset.any(axis=1)
-    when = f"{np.median(course.time[course.reset[taken].argmax(axis=1)]):.0f} s" if taken.any() else "-"
+def row(response: str, course: Course) -> dict[str, Any]:
+    """What came of a response, in figures."""
+    final, taken = course.error[:, -1], course.reset.any(axis=1)
+    return {
+        "response": response,
+        "final_error_m": float(final.mean()),
+        "ci95_m": list(mean_interval(final)),
+        "largest_error_m": float(course.error.max(axis=1).mean()),
+        "reset_share": float(taken.mean()),
+        "median_reset_s": float(np.median(course.time[course.reset[taken].argmax(axis=1)])) if taken.any() else None,
+        "used_share": float(course.used.mean()),
+    }
+
+
+def _line(row: dict[str, Any]) -> str:
+    (low, high), when = row["ci95_m"], row["median_reset_s"]
     return (
-        f"| `{response}` | {final.mean():.1f} [{low:.1f}, {high:.1f}] | {course.error.max(axis=1).mean():.1f} "
-        f"| {100.0 * taken.mean():.0f} % | {when} | {100.0 * course.used.mean():.0f} % |"
+        f"| `{row['response']}` | {row['final_error_m']:.1f} [{low:.1f}, {high:.1f}] | {row['largest_error_m']:.1f} "
+        f"| {100.0 * row['reset_share']:.0f} % | {'-' if when is None else f'{when:.0f} s'} "
+        f"| {100.0 * row['used_share']:.0f} % |"
     )
 
 
 def draw(courses: dict[str, Course], path: Path) -> None:
-    """The median error and the middle 90 % of the runs over time, on a logarithmic axis.
+    """The median error and the middle 90 % of the runs over time, of the responses in `DRAWN`; a logarithmic axis.
 
     Raises:
         ImportError: matplotlib is missing.
@@ -155,8 +178,8 @@ def draw(courses: dict[str, Course], path: Path) -> None:
     time = next(iter(courses.values())).time
     offset = JUMP + RATE * np.maximum(time - PATIENCE, 0.0)
     axes.plot(time, offset, color="black", linestyle=":", linewidth=1.4, label="offset of the spoofer")
-    for (name, course), colour in zip(courses.items(), COLOURS, strict=True):
-        low, middle, high = np.quantile(course.error, (0.05, 0.5, 0.95), axis=0)
+    for name, colour in zip(DRAWN, COLOURS, strict=True):
+        low, middle, high = np.quantile(courses[name].error, (0.05, 0.5, 0.95), axis=0)
         axes.fill_between(time, low, high, color=colour, alpha=0.18, linewidth=0.0)
         axes.plot(time, middle, color=colour, linewidth=1.8, label=name)
     axes.axvline(PATIENCE, color="grey", linewidth=0.8)
@@ -177,6 +200,8 @@ def parser() -> argparse.ArgumentParser:
     )
     result.add_argument("--runs", type=count, default=400, help="per response (default: %(default)s)")
     add_seed(result, "run 0")
+    add_threads(result)
+    add_json(result)
     add_figure(result)
     return result
 
@@ -185,15 +210,34 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    courses = {response: play(response, options.runs, options.seed) for response in RESPONSES}
-    print(f"{PatientSpoofer(onset=ONSET).name} on {SCENARIO}, {options.runs} runs from seed {options.seed}\n")
-    print("| response | final error, m | greatest error, m | reset | first reset | spoofed fixes used |")
-    print("|---|---|---|---|---|---|")
-    for response, course in courses.items():
-        print(row(response, course))
-    if options.figure is not None:
-        draw({name: courses[name] for name in DRAWN}, options.figure)
+    terminal = console(stderr=options.json == STDOUT)
+    courses: dict[str, Course] = {}
+    report = last_of(_reports(options, courses, terminal.status))
+    lines = [
+        f"{report['attack']} on {report['scenario']}, {report['runs']} runs from seed {report['seed']}\n",
+        "| response | final error, m | greatest error, m | reset | first reset | spoofed fixes used |",
+        "|---|---|---|---|---|---|",
+        *map(_line, report["rows"]),
+    ]
+    outputs: list[Output] = [("figure", options.figure, partial(draw, courses))]
+    give(report, "\n".join(lines), options.json, terminal, outputs)
     return 0
+
+
+def _reports(options: argparse.Namespace, courses: dict[str, Course], progress: Progress) -> Iterator[dict[str, Any]]:
+    """The ``"patient-spoofer"`` report after each response, whose runs are put into ``courses``."""
+    head = {
+        "schema_version": SCHEMA_VERSION,
+        "kind": "patient-spoofer",
+        "scenario": SCENARIO,
+        "attack": PatientSpoofer(onset=ONSET).name,
+        "runs": options.runs,
+        "seed": options.seed,
+    }
+    for response in RESPONSES:
+        with progress(response):
+            courses[response] = play(response, options.runs, options.seed, options.threads)
+        yield {**head, "rows": [row(name, course) for name, course in courses.items()]}
 
 
 if __name__ == "__main__":

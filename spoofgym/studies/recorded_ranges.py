@@ -12,8 +12,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from spoofgym.command_line import STDOUT, Parser, add_json
+from spoofgym.console import console
 from spoofgym.evaluation.recorded_ranges import side_by_side
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import last_of, moved, program
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym study recorded-ranges FOLDER --json out.json",
@@ -78,9 +80,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    report = side_by_side(options.path)
-    out = sys.stderr if options.json == STDOUT else sys.stdout
-    do_all(lambda: print("\n".join(tables(report)), file=out), lambda: give_json(report, options.json))
+    terminal = console(stderr=options.json == STDOUT)
+    report = last_of(side_by_side(options.path, terminal.status))
+    give(report, "\n".join(tables(report)), options.json, terminal)
     return 0
 
 

@@ -10,18 +10,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, above_one, add_import, add_json, share_of_alarms
+from spoofgym.console import console
 from spoofgym.detectors import DETECTORS, at_arl0, make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.recorded_matrix import those_with_thresholds
 from spoofgym.evaluation.report import SCHEMA_VERSION
-from spoofgym.program import do_all, give_json, moved, program, say
+from spoofgym.program import last_of, moved, program, say
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym thresholds --scenario liu-flight --arl0 1e3 1e4 1e5",
@@ -33,47 +36,55 @@ DEFAULT_ARL0S = (1e3, 1e4, 1e5)
 DEFAULT_SHARES = (0.1, 0.01)
 
 
-def threshold_rows(scenario: Scenario, detectors: Sequence[str], arl0s: Sequence[float]) -> list[dict[str, Any]]:
-    """A row for each detector and ARL₀.
+def threshold_rows(
+    scenario: Scenario, detectors: Sequence[str], arl0s: Sequence[float], progress: Progress = silent
+) -> Iterator[list[dict[str, Any]]]:
+    """A row for each detector and ARL₀, after every ARL₀.
 
     Args:
         scenario: in which thresholds hold.
         detectors: specifications without a threshold.
         arl0s: wanted, epochs.
+        progress: shows what is looked for.
 
     Raises:
         ValueError: a detector that is unknown or does not fit the scenario, or an ARL₀ that is not greater than 1.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for arl0 in arl0s:
-        asked = [make_detector(at_arl0(text, arl0)) for text in detectors]
-        ready = calibrated_for_play(asked, scenario, scenario.fidelities[0])
+        with progress(f"thresholds at ARL0 {arl0:g}"):
+            asked = [make_detector(at_arl0(text, arl0)) for text in detectors]
+            ready = calibrated_for_play(asked, scenario, scenario.fidelities[0])
         for text, detector in zip(detectors, ready, strict=True):
             rows.append(_row(text, arl0, detector))
-    return sorted(rows, key=lambda row: detectors.index(row["detector"]))
+        yield sorted(rows, key=lambda row: detectors.index(row["detector"]))
 
 
-def log_rows(log: Scenario, detectors: Sequence[str], shares: Sequence[float]) -> list[dict[str, Any]]:
-    """A row for each detector and share of alarms in the clean game of a log.
+def log_rows(
+    log: Scenario, detectors: Sequence[str], shares: Sequence[float], progress: Progress = silent
+) -> Iterator[list[dict[str, Any]]]:
+    """A row for each detector and share of alarms in the clean game of a log, after every share.
 
     Args:
         log: recorded.
         detectors: specifications.
         shares: wanted, per epoch.
+        progress: shows what is looked for.
 
     Raises:
         ValueError: a detector that is unknown or does not fit the log, or a log too short for a share.
     """
     made = {detector.name: text for text, detector in ((text, make_detector(text)) for text in detectors)}
-    rows = []
+    rows: list[dict[str, Any]] = []
     for share in shares:
-        ready, refused = those_with_thresholds([log], [make_detector(text) for text in detectors], share)
+        with progress(f"thresholds at a share of {share:g}"):
+            ready, refused = those_with_thresholds([log], [make_detector(text) for text in detectors], share)
         for reason in refused.values():
             say(f"left out: {reason}")
         for detector in ready:
             row = _row(made[detector.name], None, detector)
             rows.append({**row, "false_alarm_probability": share, "from": "the clean log"})
-    return sorted(rows, key=lambda row: detectors.index(row["detector"]))
+        yield sorted(rows, key=lambda row: detectors.index(row["detector"]))
 
 
 def _row(text: str, arl0: float | None, detector: Detector) -> dict[str, Any]:
@@ -123,6 +134,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
+    terminal = console(stderr=options.json == STDOUT)
     scenario = make_scenario(options.scenario)
     names = options.detector or fitting(scenario)
     if not scenario.random and not options.detector:
@@ -130,14 +142,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if scenario.random:
         if options.p_fa is not None:
             raise ValueError("--p-fa is of recorded logs; thresholds in a simulated scenario have an --arl0")
-        rows = threshold_rows(scenario, names, options.arl0 or DEFAULT_ARL0S)
+        series = threshold_rows(scenario, names, options.arl0 or DEFAULT_ARL0S, terminal.status)
     else:
         if options.arl0 is not None:
             raise ValueError("--arl0 is of simulated scenarios; thresholds on a recorded log have a --p-fa")
-        rows = log_rows(scenario, names, options.p_fa or DEFAULT_SHARES)
-    report = {"schema_version": SCHEMA_VERSION, "kind": "thresholds", "scenario": scenario.name, "rows": rows}
-    out = sys.stderr if options.json == STDOUT else sys.stdout
-    do_all(lambda: print("\n".join(map(_line, rows)), file=out), lambda: give_json(report, options.json))
+        series = log_rows(scenario, names, options.p_fa or DEFAULT_SHARES, terminal.status)
+    head: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "kind": "thresholds", "scenario": scenario.name}
+    report = last_of({**head, "rows": rows} for rows in series)
+    give(report, "\n".join(map(_line, report["rows"])), options.json, terminal)
     return 0
 
 

@@ -16,10 +16,11 @@ from typing import Any
 from rich.table import Table
 
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, add_threads, count
-from spoofgym.console import console, show
-from spoofgym.evaluation.tuning import tuning_report
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.console import console
+from spoofgym.evaluation.tuning import tuning_reports
+from spoofgym.program import last_of, moved, program
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.giving import give
 
 EXAMPLES = (
     "spoofgym tune --scenario foi-drive",
@@ -49,9 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
     scenario = make_scenario(options.scenario)
-    report = tuning_report(scenario, options.episodes, options.seed, options.threads, terminal.status)
-    table = tuning_table(report, options.episodes)
-    do_all(lambda: show(terminal, table), lambda: give_json(report, options.json))
+    reports = tuning_reports(scenario, options.episodes, options.seed, options.threads, terminal.status)
+    report = last_of(reports)
+    give(report, tuning_table(report, options.episodes), options.json, terminal)
     return 0
 
 

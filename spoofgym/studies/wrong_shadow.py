@@ -7,23 +7,24 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rich.table import Table
 
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, add_threads, count
-from spoofgym.console import console, show
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.evaluation.attackers import Evaluation
 from spoofgym.evaluation.progress import Progress
-from spoofgym.evaluation.wrong_shadow import check_policies, wrong_shadow_report, wrong_shadows
+from spoofgym.evaluation.wrong_shadow import check_policies, wrong_shadow_reports, wrong_shadows
 from spoofgym.policies.baselines import exact_threshold
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.published import policy_folder
-from spoofgym.program import do_all, give_json, moved, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.giving import give
 from spoofgym.studies.notes import tell_what_is_new
 from spoofgym.studies.presentation import number
 
@@ -91,14 +92,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = _report(options, terminal.status)
-    do_all(lambda: show(terminal, wrong_shadow_table(report)), lambda: give_json(report, options.json))
-    if options.json not in (None, STDOUT):
-        terminal.print(f"rows in {options.json}", soft_wrap=True)
+    report = last_of(_reports(options, terminal.status))
+    give(report, wrong_shadow_table(report), options.json, terminal)
     return 0
 
 
-def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+def _reports(options: argparse.Namespace, progress: Progress) -> Iterator[dict[str, Any]]:
     scenario = make_scenario(options.scenario)
     wrong_shadows(scenario)  # refuses a scenario without them before a threshold is looked for
     detectors = calibrated_for_play([make_detector(options.detector)], scenario, "linear")
@@ -121,7 +120,7 @@ def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     policies = [LearnedSpoofer.load(policy_folder(text)) for text in options.attacker]
     check_policies(evaluation, policies)
     tell_what_is_new(policies, scenario, "linear", detectors)
-    return wrong_shadow_report(evaluation, threshold, policies, progress)
+    return wrong_shadow_reports(evaluation, threshold, policies, progress)
 
 
 if __name__ == "__main__":

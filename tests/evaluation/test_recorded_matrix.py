@@ -8,7 +8,7 @@ import pytest
 from spoofgym.attacks import make_attack
 from spoofgym.cli.main import main
 from spoofgym.detectors import make_detector
-from spoofgym.evaluation.recorded_matrix import at_false_alarm_probability, play, recorded_matrix, starts
+from spoofgym.evaluation.recorded_matrix import at_false_alarm_probability, play, recorded_matrices, starts
 from spoofgym.scenarios import make_scenario
 from tests.scenarios.test_recorded import write_log
 
@@ -45,7 +45,7 @@ def test_alarms_are_owed_to_the_attack(log):
     """A huge jump is found at once by all games; what alarms in clean games as well is not owed to it."""
     detectors = [make_detector("snapshot")]
     attacks = [make_attack("jump:500"), make_attack("ramp:0.0001")]
-    report = recorded_matrix(log, detectors, attacks, 0.1, 4)
+    *_, report = recorded_matrices(log, detectors, attacks, 0.1, 4)
     clean, jump, ramp = report["rows"]
     assert (jump["detection_probability"], jump["mean_undetected_error_m"]) == (1.0, 0.0)
     assert clean["detection_probability"] > 0.0

@@ -38,7 +38,7 @@ def test_white_noise_gives_no_alarms_and_a_pull_is_followed(folder: Path) -> Non
     A detector's statistic exceeds its threshold in one of 100,000 epochs at most: in the 100 epochs here alarms begin
     three times or more with a probability below 1e-9.
     """
-    report = side_by_side(str(folder))
+    *_, report = side_by_side(str(folder))
     json.dumps(report, allow_nan=False)
     assert [row["filter"] for row in report["clean"]] == list(FILTERS)
     for row in report["clean"]:
@@ -99,7 +99,7 @@ def test_common_epochs_and_games_between_gaps() -> None:
 def test_a_phone_in_a_city(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorded_ranges, "SPACING", 600.0)
     monkeypatch.setattr(recorded_ranges, "PULLS", (2.0,))
-    report = side_by_side(str(PHONE))
+    *_, report = side_by_side(str(PHONE))
     for row in report["clean"]:
         assert row["common_median_m"] < 4.0
     for row in report["pulled"]:

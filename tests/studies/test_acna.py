@@ -63,7 +63,7 @@ def test_thresholds_at_the_ends():
 def few(monkeypatch):
     """A grid of invented rates in place of the study, the accuracy of whose pairs rises with the threshold."""
 
-    def rates(scenario, test, runs, seed):
+    def rates(scenario, test, runs, seed, num_threads):
         shape = (20, len(acna_study.THRESHOLDS[test]))
         values = np.linspace(0.0, 1.0, shape[0] * shape[1]).reshape(shape)
         return Rates(values, 0.5 - 0.5 * values, 0.5 - 0.5 * values)

@@ -16,9 +16,10 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.foi_drive import foi_trajectory
 from spoofgym.simulation import Simulation
 from spoofgym.studies.reproduce import foi_games, foi_r_5687, liu_2018, rows
-from spoofgym.studies.reproduce.__main__ import PAPERS, main
+from spoofgym.studies.reproduce.__main__ import main
 from spoofgym.studies.reproduce.foi_azimuth import DEGREES, RADIANS, largest_offset, printed_offsets
 from spoofgym.studies.reproduce.foi_tables import ATTACKS, TABLE_3, TABLE_5, TABLE_9, Attacked
+from spoofgym.studies.reproduce.papers import reproduce
 from spoofgym.studies.reproduce.rows import NEVER, Published, Reproduction, Row, number_verdict, rounded
 from spoofgym.studies.reproduce.table import number
 from spoofgym.studies.reproduce.tracks import Tracks, play
@@ -259,7 +260,7 @@ def check_report(report: Reproduction) -> dict[str, Row]:
 
 @pytest.fixture(scope="module")
 def liu():
-    return liu_2018.reproduce(4, 0, True)
+    return reproduce(liu_2018.PAPER, 4, 0, True)
 
 
 def test_liu_rows(liu):
@@ -306,7 +307,7 @@ def test_foi_rows(monkeypatch):
     """All games of tables 3, 5 and 9; of those that vary the process noise the two ends, with one setting."""
     monkeypatch.setattr(foi_r_5687, "NOISES", (1.0, 1000.0))
     monkeypatch.setattr(foi_r_5687, "SETTING_ORDER", (6,))
-    report = foi_r_5687.reproduce(4, 0, True)
+    report = reproduce(foi_r_5687.PAPER, 4, 0, True)
     items = check_report(report)
     for name, table in (("table 3", TABLE_3), ("table 5", TABLE_5), ("table 9", TABLE_9)):
         assert sum(item.startswith(f"{name}, ") and "recomputed" not in item for item in items) == 5 * len(table)
@@ -327,7 +328,7 @@ def test_command_writes_json_alone_to_stdout(capsys):
 
 
 def test_tables_fit_100_columns_and_lose_nothing(liu, capsys, tmp_path, monkeypatch):
-    monkeypatch.setitem(PAPERS, "liu-2018", lambda runs, seed, quick: liu)
+    monkeypatch.setattr(liu_2018, "groups", lambda runs, seed, quick: iter(liu.groups))
     path = tmp_path / "new" / "rows.json"
     assert main(["liu-2018", "--quick", "--json", str(path)]) == 0
     out = capsys.readouterr().out

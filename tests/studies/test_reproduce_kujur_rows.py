@@ -7,8 +7,8 @@ import pytest
 
 from spoofgym.detectors import cpi_theory
 from spoofgym.studies.reproduce import kujur_2024
-from spoofgym.studies.reproduce.__main__ import PAPERS
 from spoofgym.studies.reproduce.kujur_grids import compared
+from spoofgym.studies.reproduce.papers import PAPERS, reproduce
 
 pytestmark = pytest.mark.slow
 
@@ -29,11 +29,11 @@ def bisected(required, missed, most):
 def report():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cpi_theory, "minimum_epochs", bisected)
-        return kujur_2024.reproduce(2, 0, True)
+        return reproduce(kujur_2024.PAPER, 2, 0, True)
 
 
 def test_rows(report):
-    assert PAPERS["kujur-2024"] is kujur_2024.reproduce
+    assert PAPERS["kujur-2024"] is kujur_2024
     parsed = json.loads(json.dumps(report.as_json(), allow_nan=False))
     assert parsed["paper"] == "kujur-2024"
     items = {row.item: row for row in report.rows}

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from spoofgym.studies.reproduce import shadmehri_2025
+from spoofgym.studies.reproduce.papers import reproduce
 from spoofgym.studies.reproduce.shadmehri_2025 import COMMON, SELF_TUNING, Flights, Setup, fly, statistic
 
 UNLIKELY = 1e-8
@@ -78,7 +79,7 @@ def _flown_at_10_hz(monkeypatch):
 
 @pytest.mark.usefixtures("_flown_at_10_hz")
 def test_rows_have_every_setup_and_figures_of_the_paper():
-    report = shadmehri_2025.reproduce(3, 0, quick=True)
+    report = reproduce(shadmehri_2025.PAPER, 3, 0, quick=True)
     assert report.paper == "shadmehri-2025"
     titles = [group.title for group in report.groups]
     assert len(titles) == len(set(titles)) == 8

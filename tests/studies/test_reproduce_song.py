@@ -7,6 +7,7 @@ from spoofgym.evaluation.credibility import deviation
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.studies.reproduce import song_2021
+from spoofgym.studies.reproduce.papers import reproduce
 from spoofgym.studies.reproduce.song_2021 import ACNA, CLEAN, EKF, GNSS, JUMPS, MIX, SLOW, TABLES, drive, latency
 from spoofgym.studies.reproduce.tracks import Tracks, play
 
@@ -70,7 +71,7 @@ def test_the_jump_test_alone_is_an_epoch_later_than_both(drives):
 
 def test_rows_have_every_figure_of_tables_3_to_7(drives, monkeypatch):
     monkeypatch.setattr(song_2021, "drive", lambda runs, seed: drives)
-    report = song_2021.reproduce(RUNS, 0, quick=True)
+    report = reproduce(song_2021.PAPER, RUNS, 0, quick=True)
     assert report.paper == "song-2021"
     printed = [row.paper_value for row in report.rows]
     for _, lines in TABLES.values():

@@ -35,7 +35,8 @@ def test_error_and_detection_of_the_common_filter_are_those_of_its_covariance():
     ratio = np.square(clean.error[late]).mean() / np.square(clean.sigma[late]).mean()
     assert ratio == pytest.approx(1.0, abs=0.33)
     strong = self_tuning.play(self_tuning.COMMON, "white", 20.0, 50, 300, 0)
-    assert re.match(r"100 %, \d\.\d s", self_tuning.row(self_tuning.COMMON, clean, strong).split("|")[9].strip())
+    row = self_tuning.row(self_tuning.COMMON, "white", clean, strong)
+    assert re.match(r"100 %, \d\.\d s", self_tuning.line(row).split("|")[9].strip())
 
 
 def test_wrong_arguments_end_the_program(capsys):

@@ -30,7 +30,7 @@ from spoofgym.evaluation.defenders import (
     NOBODY,
     POPULATIONS,
     check_names,
-    evaluate_defenders,
+    defenders_reports,
     everybody,
     left_out,
 )
@@ -39,10 +39,10 @@ from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.classical import own_defenders, parse, watcher_and_response
 from spoofgym.policies.learned import LearnedDefender
 from spoofgym.policies.published import policy_folder
-from spoofgym.program import program
+from spoofgym.program import last_of, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.defenders_presentation import defenders_figure, defenders_tables
-from spoofgym.studies.evaluate.giving import Output, give
+from spoofgym.studies.giving import Output, give
 from spoofgym.studies.notes import tell_what_is_new
 
 EXAMPLES = (
@@ -122,4 +122,6 @@ def _report(options: argparse.Namespace, terminal: Console, log: GameLog) -> dic
             terminal.print(line, markup=False, soft_wrap=True)
     company = NOBODY if options.only else everybody(scenario)
     games = (options.episodes, options.seed, options.threads)
-    return evaluate_defenders(scenario, fidelity, policies, given, populations, company, *games, terminal.status, log)
+    return last_of(
+        defenders_reports(scenario, fidelity, policies, given, populations, company, *games, terminal.status, log)
+    )

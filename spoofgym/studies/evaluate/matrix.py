@@ -31,14 +31,15 @@ from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.matrix_games import ATTACKS, DETECTORS, Matrix
-from spoofgym.evaluation.recorded_matrix import GAMES, recorded_matrix
+from spoofgym.evaluation.recorded_matrix import GAMES, recorded_matrices
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.published import POLICY
-from spoofgym.program import program
+from spoofgym.program import last_of, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
-from spoofgym.studies.evaluate.giving import give, spoofers
+from spoofgym.studies.evaluate.attackers import spoofers
+from spoofgym.studies.giving import give
 from spoofgym.studies.matrix_presentation import curves_figure, matrix_figure, matrix_tables
 from spoofgym.studies.notes import tell_what_is_new
 
@@ -130,7 +131,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
         _roc_attack(options.roc_attack, matrix.names(options.attack, policies))
     matrix.check_knowledge(policies)
     tell_what_is_new(policies, scenario, fidelity)
-    return matrix.report(options.detector or (), options.attack, policies, terminal.status)
+    return last_of(matrix.reports(options.detector or (), options.attack, policies, terminal.status))
 
 
 def _of_log(options: argparse.Namespace, log: Scenario, terminal: Console) -> dict[str, Any]:
@@ -150,7 +151,8 @@ def _of_log(options: argparse.Namespace, log: Scenario, terminal: Console) -> di
     for attack in asked:
         _check_fits(attack, log)
     attacks = asked if options.attack else [*filter(partial(_fits, log), map(make_spoofer, ATTACKS)), *asked]
-    return recorded_matrix(log, detectors, attacks, options.p_fa or P_FA, options.episodes or GAMES, terminal.status)
+    games = (options.p_fa or P_FA, options.episodes or GAMES)
+    return last_of(recorded_matrices(log, detectors, attacks, *games, terminal.status))
 
 
 def _check_fits(attack: Attack, log: Scenario) -> None:

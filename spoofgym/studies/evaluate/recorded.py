@@ -6,22 +6,25 @@ spoofgym evaluate recorded FOLDER --attack ramp:0.5 --detector snapshot --json -
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, share_of_alarms
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
+from spoofgym.detectors.base import Detector
 from spoofgym.envs.opponents import make_spoofer
-from spoofgym.evaluation.recorded import evaluate_recorded
+from spoofgym.evaluation.progress import Progress
+from spoofgym.evaluation.recorded import recorded_rows
 from spoofgym.evaluation.recorded_matrix import at_false_alarm_probability
 from spoofgym.evaluation.report import recorded_report
-from spoofgym.program import program
+from spoofgym.program import last_of, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
-from spoofgym.studies.evaluate.giving import Output, give
+from spoofgym.studies.giving import Output, give
 from spoofgym.studies.presentation import recorded_figure, recorded_table
 
 EXAMPLES = (
@@ -56,9 +59,10 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
-    report = _report(options)
+    terminal = console(stderr=options.json == STDOUT)
+    report = _report(options, terminal.status)
     outputs: list[Output] = [("figure", options.figure, partial(recorded_figure, report))]
-    give(report, recorded_table(report), options.json, console(stderr=options.json == STDOUT), outputs)
+    give(report, recorded_table(report), options.json, terminal, outputs)
     return 0
 
 
@@ -71,7 +75,7 @@ def recorded_log(text: str) -> Scenario:
     return make_scenario(text if text.startswith(f"{RECORDED}:") else f"{RECORDED}:{text}")
 
 
-def _report(options: argparse.Namespace) -> dict[str, Any]:
+def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     scenario = recorded_log(options.log)
     detectors = [make_detector(name) for name in options.detector or ["snapshot"]]
     if options.p_fa is not None:
@@ -79,4 +83,16 @@ def _report(options: argparse.Namespace) -> dict[str, Any]:
     else:
         ready = calibrated_for_play(detectors, scenario, scenario.fidelities[0])
     attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]
-    return recorded_report(scenario, ready, evaluate_recorded(scenario, attacks, ready))
+    return last_of(_reports(scenario, attacks, ready, progress))
+
+
+def _reports(
+    scenario: Scenario, attacks: Sequence[Attack], detectors: list[Detector], progress: Progress
+) -> Iterator[dict[str, Any]]:
+    """The report after every attack."""
+    rows: list[dict[str, Any]] = []
+    played = recorded_rows(scenario, attacks, detectors)
+    for attack in attacks:
+        with progress(attack.name):
+            rows.append(next(played))
+        yield recorded_report(scenario, detectors, list(rows))

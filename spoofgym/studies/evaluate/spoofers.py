@@ -9,13 +9,14 @@ bound as a figure. Every attacker meets the same noise.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
 from rich.console import Console, Group
 
 from spoofgym.attacks import ATTACKS
+from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import (
     STDOUT,
@@ -28,18 +29,21 @@ from spoofgym.command_line import (
     add_threads,
     count,
 )
-from spoofgym.console import console, show
+from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.attackers import Evaluation
 from spoofgym.evaluation.game_log import GameLog
+from spoofgym.evaluation.progress import Progress
 from spoofgym.evaluation.report import attackers_report
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.policies.baselines import exact_threshold
-from spoofgym.program import kept, program
+from spoofgym.policies.learned import LearnedSpoofer
+from spoofgym.program import last_of, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.specification import registered_by_others
-from spoofgym.studies.evaluate.giving import Output, give, spoofers
+from spoofgym.studies.evaluate.attackers import spoofers
+from spoofgym.studies.giving import Output, give
 from spoofgym.studies.notes import tell_what_is_new
 from spoofgym.studies.presentation import aggregates_tables, attackers_figure, attackers_table
 
@@ -117,9 +121,16 @@ def _report(options: argparse.Namespace, terminal: Console) -> tuple[dict[str, A
     evaluation.check_layouts(policies)
     evaluation.check_attacks(attacks)
     tell_what_is_new(policies, scenario, fidelity, detectors)
+    return last_of(_reports(evaluation, policies, attacks, terminal.status)), evaluation.log
+
+
+def _reports(
+    evaluation: Evaluation, policies: list[LearnedSpoofer], attacks: list[Attack], progress: Progress
+) -> Iterator[dict[str, Any]]:
+    """The report after every attacker that has played; the last one has all of them."""
     rows: list[dict[str, Any]] = []
-    with kept(lambda: show(terminal, attackers_table(attackers_report(scenario, fidelity, detectors, rows)))):
-        for row in evaluation.rows(policies, attacks, terminal.status):
-            rows.append(row)
-    report = attackers_report(scenario, fidelity, detectors, rows)
-    return {**report, "aggregates": evaluation.aggregates(policies)}, evaluation.log
+    common = (evaluation.scenario, evaluation.fidelity, evaluation.detectors)
+    for row in evaluation.rows(policies, attacks, progress):
+        rows.append(row)
+        yield {**attackers_report(*common, list(rows)), "aggregates": []}
+    yield {**attackers_report(*common, rows), "aggregates": evaluation.aggregates(policies)}

@@ -14,19 +14,21 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 from spoofgym.command_line import STDOUT, Parser, add_json, add_seed, count
 from spoofgym.console import console
-from spoofgym.program import do_all, give_json, moved, program
-from spoofgym.studies.reproduce import foi_r_5687, kujur_2024, liu_2018, shadmehri_2025, song_2021
-from spoofgym.studies.reproduce.table import WIDTH, print_reproduction
+from spoofgym.program import last_of, moved, program
+from spoofgym.studies.giving import give
+from spoofgym.studies.reproduce.papers import PAPERS, reproductions
+from spoofgym.studies.reproduce.table import WIDTH, reproduction_parts
 
 EXAMPLES = (
     "spoofgym reproduce liu-2018",
     "spoofgym reproduce foi-r-5687 --quick --json rows.json",
 )
 
-PAPERS = {module.PAPER: module.reproduce for module in (liu_2018, foi_r_5687, shadmehri_2025, song_2021, kujur_2024)}
 RUNS, QUICK_RUNS = 40, 4
 
 
@@ -52,10 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     terminal = console(stderr=options.json == STDOUT)
     if not terminal.is_terminal:
         terminal.width = WIDTH
-    report = PAPERS[options.paper](runs, options.seed, options.quick)
-    do_all(lambda: print_reproduction(report, terminal), lambda: give_json(report.as_json(), options.json))
-    if options.json not in (None, STDOUT):
-        terminal.print(f"rows in {options.json}", soft_wrap=True)
+    series = reproductions(options.paper, runs, options.seed, options.quick, terminal.status)
+    report = last_of(series, partial(replace, complete=False))
+    give(report.as_json(), reproduction_parts(report, terminal.width), options.json, terminal)
     return 0
 
 

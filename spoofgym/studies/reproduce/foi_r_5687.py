@@ -6,7 +6,7 @@ process noise, which the report does not print and which decides whether GNSS is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -44,10 +44,10 @@ from spoofgym.studies.reproduce.foi_tables import (
 from spoofgym.studies.reproduce.rows import (
     NEVER,
     Grid,
+    Group,
     Listing,
     Published,
     Reasons,
-    Reproduction,
     Row,
     Verdict,
     event_row,
@@ -94,28 +94,25 @@ READINGS = (
 )
 
 
-def reproduce(runs: int, seed: int, quick: bool) -> Reproduction:
-    """All rows.
+def groups(runs: int, seed: int, quick: bool) -> Iterator[Group]:
+    """All rows, a group after the other.
 
     Args:
         runs: games of each scenario and setting.
         seed: of game 0.
-        quick: how the result is marked.
+        quick: of no effect on the rows of this paper.
     """
     games = Games(runs, seed, {window: relative_threshold(window, seed) for window in (5, 20)})
     undefended = {scenario: games.undefended(scenario) for scenario in ATTACKS}
-    groups = (
-        attack_reading(),
-        without_detector(undefended),
-        table(games, "Table 3: test (1), relative motion", "table 3", TABLE_3),
-        table(games, "Table 5: test (3), innovations", "table 5", TABLE_5),
-        statements(games),
-        table_6(games),
-        table(games, "Table 9: test (3), one degree", "table 9", TABLE_9),
-        scenario_5(games),
-        process_noise(games),
-    )
-    return Reproduction(PAPER, TITLE, runs, seed, quick, READINGS, groups)
+    yield attack_reading()
+    yield without_detector(undefended)
+    yield table(games, "Table 3: test (1), relative motion", "table 3", TABLE_3)
+    yield table(games, "Table 5: test (3), innovations", "table 5", TABLE_5)
+    yield statements(games)
+    yield table_6(games)
+    yield table(games, "Table 9: test (3), one degree", "table 9", TABLE_9)
+    yield scenario_5(games)
+    yield process_noise(games)
 
 
 def attack_reading() -> Grid:

@@ -7,6 +7,8 @@ Figure 7 shows realisations of the tracking error, of which there is nothing to 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import stats
 
@@ -27,9 +29,9 @@ from spoofgym.studies.reproduce.kujur_games import (
 )
 from spoofgym.studies.reproduce.kujur_windows import P_FA, Windows, coasting, cumulative_exact, windows
 from spoofgym.studies.reproduce.rows import (
+    Group,
     Listing,
     Published,
-    Reproduction,
     Row,
     number_row,
     number_verdict,
@@ -66,31 +68,28 @@ READINGS = (
 )
 
 
-def reproduce(runs: int, seed: int, quick: bool) -> Reproduction:
-    """All rows.
+def groups(runs: int, seed: int, quick: bool) -> Iterator[Group]:
+    """All rows, a group after the other.
 
     Args:
         runs: a 25th of the games of each kind.
         seed: of game 0.
-        quick: how the result is marked; there are fewer hours and tracking errors then, too.
+        quick: whether there are fewer hours and tracking errors.
     """
     scenario, games = flight(), GAMES_PER_RUN * runs
     clean = play(scenario, CLEAN, games, seed)
     spoofed = {replica: play(scenario, replica, games, seed) for replica in PLAYED}
     exact = windows(NAVIGATION)
-    groups = (
-        false_alarms(clean),
-        distributions(clean, spoofed[WHITE_2], exact),
-        figure_1(spoofed[WHITE_2]),
-        three_ways(spoofed, exact),
-        kujur_grids.missed_detection(exact),
-        kujur_grids.grades(),
-        kujur_grids.statements(exact, quick),
-        whiteness(runs, seed),
-        separation(clean),
-        *kujur_grids.shortest_windows(exact, quick),
-    )
-    return Reproduction(PAPER, TITLE, runs, seed, quick, READINGS, groups)
+    yield false_alarms(clean)
+    yield distributions(clean, spoofed[WHITE_2], exact)
+    yield figure_1(spoofed[WHITE_2])
+    yield three_ways(spoofed, exact)
+    yield kujur_grids.missed_detection(exact)
+    yield kujur_grids.grades()
+    yield kujur_grids.statements(exact, quick)
+    yield whiteness(runs, seed)
+    yield separation(clean)
+    yield from kujur_grids.shortest_windows(exact, quick)
 
 
 def share_row(item: str, published: Published, events: int, trials: int, reason: str) -> Row:

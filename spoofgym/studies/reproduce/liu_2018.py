@@ -8,6 +8,7 @@ noise, so that differences between ramps are paired. The noise of the fixes is w
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,9 +26,9 @@ from spoofgym.sensors.imu import DEGREE_PER_HOUR
 from spoofgym.simulation import Simulation
 from spoofgym.studies.reproduce import liu_ranges, liu_table_2
 from spoofgym.studies.reproduce.rows import (
+    Group,
     Listing,
     Published,
-    Reproduction,
     Row,
     number_row,
     rounded,
@@ -78,25 +79,22 @@ class Flights:
     deviation: dict[float, Floats]
 
 
-def reproduce(runs: int, seed: int, quick: bool) -> Reproduction:
-    """All rows.
+def groups(runs: int, seed: int, quick: bool) -> Iterator[Group]:
+    """All rows, a group after the other.
 
     Args:
         runs: games of each ramp.
         seed: of game 0.
-        quick: how the result is marked.
+        quick: of no effect on the rows of this paper.
     """
     flights = fly_ramps(runs, seed)
-    groups = (
-        *liu_table_2.grids(flights.deviation[12.4], flights.deviation[0.0]),
-        bounds(flights),
-        innovations(flights),
-        detection(flights),
-        biases(flights),
-        backtracking(runs, seed),
-        from_ranges(runs, seed),
-    )
-    return Reproduction(PAPER, TITLE, runs, seed, quick, READINGS, groups)
+    yield from liu_table_2.grids(flights.deviation[12.4], flights.deviation[0.0])
+    yield bounds(flights)
+    yield innovations(flights)
+    yield detection(flights)
+    yield biases(flights)
+    yield backtracking(runs, seed)
+    yield from_ranges(runs, seed)
 
 
 def fly_ramps(runs: int, seed: int) -> Flights:

@@ -23,6 +23,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.evaluation.metrics import NORMAL_95
 from spoofgym.evaluation.report import SCHEMA_VERSION
+from spoofgym.program import COMPLETE
 
 Verdict = Literal["reproduced", "partly", "not reproduced"]
 Reasons = dict[Verdict, str]
@@ -221,6 +222,9 @@ class Grid:
         return tuple(cell for _, cells in self.lines for cell in cells if cell is not None)
 
 
+Group = Listing | Grid
+
+
 @dataclass(frozen=True)
 class Reproduction:
     """All rows of one paper.
@@ -233,6 +237,7 @@ class Reproduction:
         quick: whether it has too few runs to stand for anything.
         readings: how we read what the paper leaves open, a sentence each.
         groups: the rows.
+        complete: whether all groups are there.
     """
 
     paper: str
@@ -241,7 +246,8 @@ class Reproduction:
     seed: int
     quick: bool
     readings: tuple[str, ...]
-    groups: tuple[Listing | Grid, ...]
+    groups: tuple[Group, ...]
+    complete: bool = True
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -258,4 +264,5 @@ class Reproduction:
             "seed": self.seed,
             "quick": self.quick,
             "rows": [row.as_json() for row in self.rows],
+            **({} if self.complete else {COMPLETE: False}),
         }

@@ -7,6 +7,7 @@ statements about the recursion. A ramp in north and in east each runs from 20 s 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,9 @@ from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
 from spoofgym.studies.reproduce.rows import (
     NEVER,
+    Group,
     Listing,
     Published,
-    Reproduction,
     Row,
     event_row,
     rounded,
@@ -124,22 +125,19 @@ class Flights:
         return float(np.quantile(stretches.max(axis=1), 1.0 - MATCHED))
 
 
-def reproduce(runs: int, seed: int, quick: bool) -> Reproduction:
-    """All rows.
+def groups(runs: int, seed: int, quick: bool) -> Iterator[Group]:
+    """All rows, a group after the other.
 
     Args:
         runs: of each game.
         seed: of run 0.
-        quick: how the result is marked.
+        quick: of no effect on the rows of this paper.
     """
     flights = {setup: fly(setup, runs, seed) for setup in SETUPS}
-    groups = (
-        *(table_1(flights, noise, rate) for noise in ("white", "markov") for rate in (160, 10)),
-        false_alarms(flights),
-        *(matched(flights, noise) for noise in ("white", "markov")),
-        recursion(runs, seed),
-    )
-    return Reproduction(PAPER, TITLE, runs, seed, quick, READINGS, groups)
+    yield from (table_1(flights, noise, rate) for noise in ("white", "markov") for rate in (160, 10))
+    yield false_alarms(flights)
+    yield from (matched(flights, noise) for noise in ("white", "markov"))
+    yield recursion(runs, seed)
 
 
 def fly(setup: Setup, runs: int, seed: int) -> Flights:

@@ -6,6 +6,7 @@ every algorithm and data set meets the same noise.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,8 +25,8 @@ from spoofgym.simulation import Simulation
 from spoofgym.studies.acna import OneTest
 from spoofgym.studies.reproduce.rows import (
     Grid,
+    Group,
     Listing,
-    Reproduction,
     Row,
     Verdict,
     event_row,
@@ -139,23 +140,20 @@ class Drives:
         return deviation(self.error(grade, data, algorithm)[2])
 
 
-def reproduce(runs: int, seed: int, quick: bool) -> Reproduction:
-    """All rows.
+def groups(runs: int, seed: int, quick: bool) -> Iterator[Group]:
+    """All rows, a group after the other.
 
     Args:
         runs: of each game.
         seed: of run 0.
-        quick: how the result is marked.
+        quick: of no effect on the rows of this paper.
     """
     drives = drive(runs, seed)
-    groups: tuple[Listing | Grid, ...] = (
-        *(grid for data in TABLES for grid in accuracies(drives, data)),
-        deteriorations(drives),
-        latencies(drives),
-        claims(drives),
-        readings(runs, seed),
-    )
-    return Reproduction(PAPER, TITLE, runs, seed, quick, READINGS, groups)
+    yield from (grid for data in TABLES for grid in accuracies(drives, data))
+    yield deteriorations(drives)
+    yield latencies(drives)
+    yield claims(drives)
+    yield readings(runs, seed)
 
 
 def drive(runs: int, seed: int) -> Drives:

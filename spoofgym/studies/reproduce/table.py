@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from rich.console import Console
+from collections.abc import Iterator
+
+from rich.console import Group as RenderableGroup
+from rich.console import RenderableType
+from rich.constrain import Constrain
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -13,27 +17,36 @@ WIDTH = 100
 MARKS = {"reproduced": ("✓", "green"), "partly": ("~", "yellow"), "not reproduced": ("✗", "red")}
 
 
-def print_reproduction(report: Reproduction, console: Console) -> None:
-    """All groups, the readings, and how many rows came out."""
-    width = min(WIDTH, console.width)
+def reproduction_parts(report: Reproduction, columns: int) -> RenderableGroup:
+    """All groups, the readings, and how many rows came out.
+
+    Args:
+        report: the rows.
+        columns: of the terminal.
+    """
+    width = min(WIDTH, columns)
+    return RenderableGroup(*(Constrain(part, width) for part in _parts(report)))
+
+
+def _parts(report: Reproduction) -> Iterator[RenderableType]:
     runs = f"{report.runs} runs, seed {report.seed}"
     head = Text(f"{report.title}: {runs}", style="bold")
     if report.quick:
         head.append("  quick: too few runs for a verdict that counts", style="bold red")
-    console.print(head, width=width)
-    console.print(Text("Ours: median [smallest–largest run].  ✓ reproduced   ~ partly   ✗ not reproduced"), width=width)
+    yield head
+    yield Text("Ours: median [smallest–largest run].  ✓ reproduced   ~ partly   ✗ not reproduced")
     for group in report.groups:
-        console.print()
-        console.print(Text(group.title, style="bold"), width=width)
-        console.print(_listing(group) if isinstance(group, Listing) else _grid(group), width=width)
+        yield ""
+        yield Text(group.title, style="bold")
+        yield _listing(group) if isinstance(group, Listing) else _grid(group)
         if group.note:
-            console.print(Padding(Text(group.note, style="dim"), (0, 0, 0, 2)), width=width)
-    console.print()
-    console.print(Text("Readings", style="bold"))
+            yield Padding(Text(group.note, style="dim"), (0, 0, 0, 2))
+    yield ""
+    yield Text("Readings", style="bold")
     for reading in report.readings:
-        console.print(_bullet(reading), width=width)
-    console.print()
-    console.print(tally(report), width=width)
+        yield _bullet(reading)
+    yield ""
+    yield tally(report)
 
 
 def _bullet(text: str) -> Table:
