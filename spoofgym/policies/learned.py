@@ -170,7 +170,7 @@ class LearnedPolicy:
         path = folder / POLICY_FILE
         arrays = read_arrays(path)
         with files.reading(path):
-            policy = cls(folder, configuration, *_network(arrays))
+            policy = cls(folder, configuration, *network_of(arrays))
             policy.check_outputs()
         if (folder / CARD_FILE).is_file():
             policy.check_card(read_card(folder))
@@ -229,7 +229,7 @@ def _configuration(folder: Path) -> dict[str, Any]:
     return environment
 
 
-def _network(arrays: Mapping[str, NDArray[Any]]) -> tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]:
+def network_of(arrays: Mapping[str, NDArray[Any]]) -> tuple[tuple[str, ...], tuple[Any, ...], tuple[Any, ...]]:
     """Layout, weights and biases of a saved policy.
 
     Raises:

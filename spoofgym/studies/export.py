@@ -43,6 +43,7 @@ EXAMPLES = (
     "spoofgym export runs/x my-spoofer",
     "spoofgym export runs/d my-defender --onnx",
     "spoofgym export mine.zip runs/mine --scenario liu-flight --knowledge shadow",
+    "spoofgym export mine.zip runs/d --environment DuelDefender-v0 --spoofer ramp:1",
 )
 
 OPTIONS = {
@@ -59,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(prog="spoofgym export", examples=EXAMPLES, description="Export a trained policy as an agent.")
     add = result.add_argument
-    add("run", metavar="RUN", help="run folder of a training, or your own zip of Stable-Baselines3")
+    add("run", metavar="RUN", help="run folder of a training, or a zip of Stable-Baselines3")
     add("out", metavar="OUT", type=Path, help="folder of the agent or the policy; its name is the agent's")
     add("--games", type=count, default=GAMES, help="for the scores of the card (default: %(default)s)")
     add_seed(result, "game 0", SEED)
@@ -84,7 +85,7 @@ def make_agent(options: argparse.Namespace) -> int:
         raise ValueError(f"{folder} is an agent already: name the run folder of its training")
     policy, run = load_policy(folder), read_config(folder)
     terminal = console()
-    with terminal.status(f"playing {options.games} games"):
+    with terminal.progress(f"playing {options.games} games"):
         scores = agent_scores(policy, options.games, options.seed)
     card = Card(
         name=out.resolve().name,
