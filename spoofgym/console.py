@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+from contextlib import AbstractContextManager, nullcontext
 from copy import copy
-from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.measure import Measurement
-from rich.status import Status
 from rich.table import Table
 from rich.text import Text
+
+from spoofgym.patience import Telling
 
 UNLIMITED = 10_000
 """Columns of an output that is no terminal: nothing is wrapped or cut, unless ``COLUMNS`` says how wide it is."""
@@ -22,9 +23,17 @@ NARROW_NAME = 14
 class PlainConsole(Console):
     """A console that leaves text as it is, and a closed pipe to the program."""
 
-    def status(self, status: RenderableType, **options: Any) -> Status:
-        """A spinner beside a text."""
-        return super().status(Text(status) if isinstance(status, str) else status, **options)
+    _told: Telling | None = None
+
+    def progress(self, text: str) -> AbstractContextManager[object]:
+        """Tell on stderr what goes on while the context lasts: a spinner on a terminal, else a line now and then."""
+        if self.quiet:
+            return nullcontext()
+        terminal = Console(stderr=True)
+        if terminal.is_terminal:
+            return terminal.status(Text(text))
+        self._told = self._told or Telling()
+        return self._told.part(text)
 
     def on_broken_pipe(self) -> None:
         """The program ends as any other whose reader has gone.
@@ -35,7 +44,7 @@ class PlainConsole(Console):
         raise BrokenPipeError
 
 
-def console(stderr: bool = False) -> Console:
+def console(stderr: bool = False) -> PlainConsole:
     """A console on stdout or stderr on which brackets in names are no markup."""
     result = PlainConsole(stderr=stderr, markup=False, highlight=False, emoji=False)
     if not result.is_terminal and not os.environ.get("COLUMNS", "").isdigit():

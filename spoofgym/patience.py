@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 QUIET = "SPOOFGYM_QUIET"
+EVERY = 30.0
+"""Seconds between two lines about what goes on."""
 AFTER = 3.0
 """Seconds of work after which it is named."""
 
@@ -53,6 +55,38 @@ def long_work(what: str) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+class Telling:
+    """Names the parts of long work, at most one line every `EVERY` seconds: what a spinner is on a terminal."""
+
+    def __init__(self) -> None:
+        """The work begins now."""
+        self._begun = self._told = time.monotonic()
+
+    @contextmanager
+    def part(self, what: str) -> Iterator[None]:
+        """A part of the work, as long as the context lasts.
+
+        Args:
+            what: is done.
+        """
+        if not heard():
+            yield
+            return
+        done = threading.Event()
+        thread = threading.Thread(target=self._tell, args=(what, done), daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
+
+    def _tell(self, what: str, done: threading.Event) -> None:
+        while not done.wait(max(0.0, self._told + EVERY - time.monotonic())):
+            self._told = time.monotonic()
+            _say(f"{self._told - self._begun:.0f} s so far, now: {what}")
 
 
 class Compiling:

@@ -1,12 +1,14 @@
 """What programs print: whole words and figures on any output, and names that are no markup."""
 
 import io
+import time
 
 import pytest
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from spoofgym import patience
 from spoofgym.console import PlainConsole, console, show
 
 NAMES = ("none", "a-policy-with-a-rather-long-name", "x[/y][bold] :bomb:")
@@ -84,9 +86,46 @@ def test_a_table_that_fits_is_printed_as_it_is():
     assert [line.split("  ")[0] for line in lines if "±" in line] == list(NAMES)
 
 
-def test_a_spinner_beside_a_name_with_brackets(capsys):
-    with console().status("x[/y]"):
+@pytest.fixture
+def soon(monkeypatch):
+    monkeypatch.setattr(patience, "EVERY", 0.02)
+    monkeypatch.setattr(patience._Who, "ours", True)
+    monkeypatch.setenv("SPOOFGYM_QUIET", "")
+
+
+@pytest.mark.usefixtures("soon")
+def test_what_goes_on_is_told_in_lines_where_stderr_is_no_terminal(capsys):
+    terminal = console()
+    with terminal.progress("first [/y]"):
+        time.sleep(0.1)
+    with terminal.progress("second"):
+        time.sleep(0.1)
+    said = capsys.readouterr()
+    assert said.out == ""
+    lines = said.err.splitlines()
+    assert 2 < len(lines) < 12
+    assert lines[0] == "spoofgym: 0 s so far, now: first [/y]"
+    assert lines[-1] == "spoofgym: 0 s so far, now: second"
+
+
+@pytest.mark.usefixtures("soon")
+def test_short_parts_of_long_work_share_the_lines(monkeypatch, capsys):
+    monkeypatch.setattr(patience, "EVERY", 3600.0)
+    terminal = console()
+    for part in range(100):
+        with terminal.progress(str(part)):
+            pass
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_terminal_has_a_spinner_on_stderr_beside_a_name_with_brackets(monkeypatch, capsys):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    with console().progress("x[/y]"):
         pass
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "x[/y]" in said.err
 
 
 def test_a_pipe_that_closes_is_left_to_the_program(monkeypatch):

@@ -58,7 +58,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("evaluate recorded", "detectors and attacks on a recorded log", f"{STUDIES}.evaluate.recorded"),
         Command("matrix", "every detector against every attack", f"{STUDIES}.evaluate.matrix"),
         Command("benchmark", "spoofgym-bench: scores that others can compare", f"{STUDIES}.benchmark"),
-        Command("integrity", "protection levels under spoofing", f"{STUDIES}.integrity"),
+        Command("integrity", "protection levels, Stanford diagrams", f"{STUDIES}.integrity"),
     ),
     "set up": (
         Command("thresholds", "thresholds at an equal false-alarm rate", f"{STUDIES}.thresholds"),
@@ -83,7 +83,6 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("reproduce", "published figures beside ours", f"{STUDIES}.reproduce.__main__"),
         Command("study acna", "windows and thresholds of ACNA", f"{STUDIES}.acna"),
         Command("study self-tuning", "a filter that learns its own noises", f"{STUDIES}.self_tuning"),
-        Command("study stanford", "Stanford diagrams under a slow replica", f"{STUDIES}.integrity"),
         Command("study patient-spoofer", "a spoofer that waits for a reset", f"{STUDIES}.patient_spoofer"),
         Command("study wrong-shadow", "a spoofer with another filter in mind", f"{STUDIES}.wrong_shadow"),
         Command("study fidelity-of-thresholds", "thresholds in both fidelities", f"{STUDIES}.fidelity_of_thresholds"),

@@ -42,14 +42,14 @@ class CleanFigures:
 
 
 def evaluate_recorded(
-    scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
+    scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector], seed: int = 0
 ) -> list[dict[str, Any]]:
     """The rows of all attacks; arguments and errors as `recorded_rows`."""
-    return list(recorded_rows(scenario, attacks, detectors))
+    return list(recorded_rows(scenario, attacks, detectors, seed))
 
 
 def recorded_rows(
-    scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector]
+    scenario: Scenario, attacks: Sequence[Attack], detectors: Sequence[Detector], seed: int = 0
 ) -> Iterator[dict[str, Any]]:
     """Play every attack on the log, every fix used, and compare with the unspoofed run.
 
@@ -57,6 +57,7 @@ def recorded_rows(
         scenario: the log.
         attacks: in the order of the rows.
         detectors: each with its threshold set, or with one of its own; an alarm of any counts.
+        seed: of what an attack draws; nothing else on a log is drawn.
 
     Yields:
         A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
@@ -79,7 +80,7 @@ def recorded_rows(
     }
     false = _clean_alarms(scenario, detectors)
     for attack in attacks:
-        yield {"attack": attack.name} | common | _play(scenario, attack, detectors, false)
+        yield {"attack": attack.name} | common | _play(scenario, attack, detectors, false, seed)
 
 
 def clean_figures(scenario: Scenario, detectors: Sequence[Detector]) -> CleanFigures:
@@ -170,10 +171,10 @@ def _clean_alarms(scenario: Scenario, detectors: Sequence[Detector]) -> Flags:
 
 
 def _play(
-    scenario: Scenario, attack: Attack, detectors: Sequence[Detector], false: Flags
+    scenario: Scenario, attack: Attack, detectors: Sequence[Detector], false: Flags, seed: int
 ) -> dict[str, Any]:
     """The part of a row that depends on the attack; ``false``: the alarms without one, (K,)."""
-    simulation = Simulation(scenario, attack, detectors, seed=0, fidelity="strapdown")
+    simulation = Simulation(scenario, attack, detectors, seed=seed, fidelity="strapdown")
     onset = scenario.timeline.start if attack.onset is None else attack.onset
     spoofing = not isinstance(attack, NoAttack)
     detection: tuple[float, float | None] | None = None

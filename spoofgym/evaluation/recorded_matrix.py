@@ -130,9 +130,9 @@ def _exceeded(name: str, statistic: Floats, probability: float) -> float:
     return float(0.5 * (highest[alarms - 1] + max(highest[alarms], 0.0)))
 
 
-def play(scenario: Scenario, attack: Attack | None, detectors: Sequence[Detector]) -> Course:
-    """Play a game on a log to its end."""
-    simulation = Simulation(scenario, attack, list(detectors), seed=0, fidelity=FIDELITY)
+def play(scenario: Scenario, attack: Attack | None, detectors: Sequence[Detector], seed: int = 0) -> Course:
+    """Play a game on a log to its end; the seed is that of what an attack draws."""
+    simulation = Simulation(scenario, attack, list(detectors), seed=seed, fidelity=FIDELITY)
     simulation.reset()
     simulation.resolve()
     time, statistics, errors = [], [], []
@@ -151,6 +151,7 @@ def recorded_matrices(
     attacks: Sequence[Attack],
     probability: float,
     games: int = GAMES,
+    seed: int = 0,
     progress: Progress = silent,
 ) -> Iterator[dict[str, Any]]:
     """The ``"matrix"`` report of a log after the clean games and after every attack; the last one is whole.
@@ -165,6 +166,7 @@ def recorded_matrices(
         attacks: that begin with each game.
         probability: of a false alarm per epoch, to which thresholds are set on the clean games.
         games: of each attack, which begin at equal distances along the log.
+        seed: of what an attack draws in each of them; nothing else on a log is drawn.
         progress: shows what is played.
 
     Raises:
@@ -197,7 +199,7 @@ def recorded_matrices(
     yield {**head, "rows": list(rows), **tail}
     for attack in attacks:
         with progress(attack.name):
-            played = [play(place, copy.deepcopy(attack), ready) for place in places]
+            played = [play(place, copy.deepcopy(attack), ready, seed) for place in places]
         owed = [
             (course.statistic > thresholds[:, None]) & ~alarms for course, alarms in zip(played, false, strict=True)
         ]

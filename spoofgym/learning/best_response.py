@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from rich.console import Console
 
-from spoofgym.console import console
+from spoofgym.console import PlainConsole, console
 from spoofgym.envs.duel_config import DuelConfig, DuelDefenderConfig, DuelSpooferConfig
 from spoofgym.envs.duel_game import SPOOFER
 from spoofgym.learning import defender, defender_ppo, ppo, spoofer
@@ -63,8 +62,8 @@ class BestResponse:
             raise KeyboardInterrupt
         return f"{POLICY}{folder}"
 
-    def _terminal(self) -> Console:
-        return console(stderr=True) if self.shows else Console(quiet=True)
+    def _terminal(self) -> PlainConsole:
+        return console(stderr=True) if self.shows else PlainConsole(quiet=True)
 
     def _spoofer(self, opponent: str, folder: Path, seed: int) -> tuple[Run, RunFolder, Any]:
         # a clean game teaches a spoofer nothing

@@ -18,12 +18,12 @@ from dataclasses import replace
 from typing import Any
 
 import torch
-from rich.console import Console
 from stable_baselines3 import PPO
 
 from spoofgym import files
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import Parser
+from spoofgym.console import PlainConsole
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.envs.duel_config import DuelDefenderConfig
@@ -112,7 +112,7 @@ Rows = list[dict[str, float]]
 class Training:
     """The training of one learner, and what is left of it whenever it ends."""
 
-    def __init__(self, run: Run, folder: RunFolder, terminal: Console) -> None:
+    def __init__(self, run: Run, folder: RunFolder, terminal: PlainConsole) -> None:
         """Build the learner, and put it where the run stands.
 
         Raises:
@@ -164,7 +164,7 @@ class Training:
     def _begin(self) -> None:
         """Begin with a classical defender, or with nothing."""
         if self._run.learner.imitate:
-            with self._console.status("a classical defender is imitated, then the critic learns alone"):
+            with self._console.progress("a classical defender is imitated, then the critic learns alone"):
                 try:
                     begin(self._learner, self._config, self._run.learner, self._run.seed)
                 finally:

@@ -8,9 +8,8 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 import torch
-from rich.console import Console
 
-from spoofgym.console import console
+from spoofgym.console import PlainConsole, console
 from spoofgym.learning.run_folder import Run, RunFolder, given_options
 from spoofgym.program import INTERRUPTED
 
@@ -36,7 +35,7 @@ def train(
     options: argparse.Namespace,
     folder: RunFolder,
     asked_run: Callable[[dict[str, Any]], Run],
-    make: Callable[[Run, RunFolder, Console], Training],
+    make: Callable[[Run, RunFolder, PlainConsole], Training],
 ) -> int:
     """Begin the run that the options ask for, or go on with the one in the folder; returns the exit status.
 

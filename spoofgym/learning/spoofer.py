@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from stable_baselines3 import PPO
 
 from spoofgym import files
 from spoofgym.attacks.base import KNOWLEDGE
 from spoofgym.command_line import Parser, count, share
+from spoofgym.console import PlainConsole
 from spoofgym.envs.config import ACTIONS, SpooferConfig, configure
 from spoofgym.envs.duel_config import DuelSpooferConfig
 from spoofgym.evaluation.duels import with_detectors_of
@@ -129,7 +129,7 @@ class Place:
 class Training:
     """Trials, the training of the best, and what is left of it whenever it ends."""
 
-    def __init__(self, run: Run, folder: RunFolder, terminal: Console) -> None:
+    def __init__(self, run: Run, folder: RunFolder, terminal: PlainConsole) -> None:
         """Build the learner that goes on, or the first.
 
         Raises:

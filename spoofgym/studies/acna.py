@@ -25,7 +25,7 @@ import numpy as np
 from spoofgym import files, validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks import make_attack
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_json, add_seed, add_threads, count
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, add_threads, count
 from spoofgym.console import console
 from spoofgym.detectors.acna import (
     SONG_JUMP_EPOCHS,
@@ -249,6 +249,7 @@ def parser() -> argparse.ArgumentParser:
     add("--runs", type=count, default=10, help="per pair (default: %(default)s)")
     add_seed(result, "run 0")
     add_threads(result)
+    add_import(result)
     add_json(result)
     add_figure(result)
     return result
@@ -276,7 +277,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     terminal = console(stderr=options.json == STDOUT)
     grids: dict[str, Rates] = {}
     games = (options.runs, options.seed, options.threads)
-    report = last_of(_reports(options.scenario, *games, grids, terminal.status))
+    report = last_of(_reports(options.scenario, *games, grids, terminal.progress))
     lines = [
         f"{options.scenario}, {options.runs} runs per pair from seed {options.seed}\n",
         "| test | pair | threshold, m | accuracy | false alarms | missed |",

@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     cards = {name: read_card(policy_folder(name)) for name in names}
     if options.write is not None:
         write_table(options.write, list(cards.values()))
-    report = last_of(_reports(cards, options.check, options.games, terminal.status))
+    report = last_of(_reports(cards, options.check, options.games, terminal.progress))
     give(report, _table(report, options.check), options.json, terminal)
     return FAILURE if any(row["holds"] is False for row in report["rows"]) else 0
 

@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scenario.facts.require("the bound of a duel", (INERTIAL_SOLUTION, LINEAR_MODEL))
     losses = {payoff: loss_of(payoff, scenario) for payoff in options.payoff or ["error"]}
     games = (options.clean, options.games, options.seed)
-    series = bounds(scenario.linear_model(), losses, *games, terminal.status)
+    series = bounds(scenario.linear_model(), losses, *games, terminal.progress)
     report = last_of(bound_report(scenario, found, *games) for found in series)
     give(report, bound_table(report), options.json, terminal)
     return 0

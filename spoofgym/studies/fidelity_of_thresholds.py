@@ -140,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     detectors = options.detector or NEEDING_SIMULATION
     terminal = console(stderr=options.json == STDOUT)
     games = (options.epochs, options.seed, options.threads)
-    series = rows(scenario, detectors, options.arl0, *games, terminal.status)
+    series = rows(scenario, detectors, options.arl0, *games, terminal.progress)
     head: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "kind": KIND, "scenario": scenario.name}
     report = last_of({**head, "rows": found} for found in series)
     give(report, "\n".join(map(_line, report["rows"])), options.json, terminal)

@@ -285,7 +285,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     terminal = console(stderr=options.json == STDOUT)
     kept: list[Flight] = []
     games = (runs, options.seed, options.threads)
-    found = last_of(_reports(scenario, replicas, *games, terminal.status, drawn, kept))
+    found = last_of(_reports(scenario, replicas, *games, terminal.progress, drawn, kept))
     outputs: list[Output] = [("figure", options.figure, lambda path: draw(kept[0], drawn, path))]
     give(found, table_of(found), options.json, terminal, outputs)
     return 0

@@ -212,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
     courses: dict[str, Course] = {}
-    report = last_of(_reports(options, courses, terminal.status))
+    report = last_of(_reports(options, courses, terminal.progress))
     lines = [
         f"{report['attack']} on {report['scenario']}, {report['runs']} runs from seed {report['seed']}\n",
         "| response | final error, m | greatest error, m | reset | first reset | spoofed fixes used |",

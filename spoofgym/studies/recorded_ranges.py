@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = last_of(side_by_side(options.path, terminal.status))
+    report = last_of(side_by_side(options.path, terminal.progress))
     give(report, "\n".join(tables(report)), options.json, terminal)
     return 0
 

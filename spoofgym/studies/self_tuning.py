@@ -208,7 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = last_of(_reports(options, terminal.status))
+    report = last_of(_reports(options, terminal.progress))
     give(report, "\n".join(_tables(report)), options.json, terminal)
     return 0
 

@@ -142,11 +142,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if scenario.random:
         if options.p_fa is not None:
             raise ValueError("--p-fa is of recorded logs; thresholds in a simulated scenario have an --arl0")
-        series = threshold_rows(scenario, names, options.arl0 or DEFAULT_ARL0S, terminal.status)
+        series = threshold_rows(scenario, names, options.arl0 or DEFAULT_ARL0S, terminal.progress)
     else:
         if options.arl0 is not None:
             raise ValueError("--arl0 is of simulated scenarios; thresholds on a recorded log have a --p-fa")
-        series = log_rows(scenario, names, options.p_fa or DEFAULT_SHARES, terminal.status)
+        series = log_rows(scenario, names, options.p_fa or DEFAULT_SHARES, terminal.progress)
     head: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "kind": "thresholds", "scenario": scenario.name}
     report = last_of({**head, "rows": rows} for rows in series)
     give(report, "\n".join(map(_line, report["rows"])), options.json, terminal)

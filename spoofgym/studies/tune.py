@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
     scenario = make_scenario(options.scenario)
-    reports = tuning_reports(scenario, options.episodes, options.seed, options.threads, terminal.status)
+    reports = tuning_reports(scenario, options.episodes, options.seed, options.threads, terminal.progress)
     report = last_of(reports)
     give(report, tuning_table(report, options.episodes), options.json, terminal)
     return 0

@@ -92,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = last_of(_reports(options, terminal.status))
+    report = last_of(_reports(options, terminal.progress))
     give(report, wrong_shadow_table(report), options.json, terminal)
     return 0
 

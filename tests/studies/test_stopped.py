@@ -44,13 +44,13 @@ def stop_at(monkeypatch):
         begun = []
 
         @contextmanager
-        def status(self, text, **options):
+        def progress(self, text):
             begun.append(text)
             if len(begun) == part:
                 raise KeyboardInterrupt
             yield
 
-        monkeypatch.setattr(PlainConsole, "status", status)
+        monkeypatch.setattr(PlainConsole, "progress", progress)
 
     return at
 
@@ -84,7 +84,7 @@ PROGRAMS = {
     "study patient-spoofer": (patient_spoofer, ("--runs", "2"), 2),
     "study fidelity-of-thresholds": (
         fidelity_of_thresholds,
-        ("--scenario", "liu-flight:horizon=12", "--detector", "snapshot", "--detector", WINDOWED, "--arl0", "30", "--epochs", "500"),
+        (*FLIGHT, "--detector", "snapshot", "--detector", WINDOWED, "--arl0", "30", "--epochs", "500"),
         2,
     ),
     "agents": (agents, (*AGENTS, "--check", "--games", "4"), 2),

@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from rich.console import Console
-
 from spoofgym.command_line import (
     STDOUT,
     Parser,
@@ -25,7 +23,7 @@ from spoofgym.command_line import (
     add_threads,
     count,
 )
-from spoofgym.console import console
+from spoofgym.console import PlainConsole, console
 from spoofgym.evaluation.defenders import (
     NOBODY,
     POPULATIONS,
@@ -96,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _report(options: argparse.Namespace, terminal: Console, log: GameLog) -> dict[str, Any]:
+def _report(options: argparse.Namespace, terminal: PlainConsole, log: GameLog) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     fidelity = options.fidelity or scenario.fidelities[0]
     scenario.check_fidelity(fidelity)
@@ -123,5 +121,5 @@ def _report(options: argparse.Namespace, terminal: Console, log: GameLog) -> dic
     company = NOBODY if options.only else everybody(scenario)
     games = (options.episodes, options.seed, options.threads)
     return last_of(
-        defenders_reports(scenario, fidelity, policies, given, populations, company, *games, terminal.status, log)
+        defenders_reports(scenario, fidelity, policies, given, populations, company, *games, terminal.progress, log)
     )

@@ -11,8 +11,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from rich.console import Console
-
 from spoofgym.attacks.base import Attack
 from spoofgym.command_line import (
     STDOUT,
@@ -27,7 +25,7 @@ from spoofgym.command_line import (
     picture,
     share_of_alarms,
 )
-from spoofgym.console import console
+from spoofgym.console import PlainConsole, console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.matrix_games import ATTACKS, DETECTORS, Matrix
@@ -116,7 +114,7 @@ def _roc_attack(asked: str | None, attacks: list[str]) -> str:
     return asked
 
 
-def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
+def _report(options: argparse.Namespace, terminal: PlainConsole) -> dict[str, Any]:
     scenario = make_scenario(options.scenario)
     if not scenario.random:
         return _of_log(options, scenario, terminal)
@@ -131,10 +129,10 @@ def _report(options: argparse.Namespace, terminal: Console) -> dict[str, Any]:
         _roc_attack(options.roc_attack, matrix.names(options.attack, policies))
     matrix.check_knowledge(policies)
     tell_what_is_new(policies, scenario, fidelity)
-    return last_of(matrix.reports(options.detector or (), options.attack, policies, terminal.status))
+    return last_of(matrix.reports(options.detector or (), options.attack, policies, terminal.progress))
 
 
-def _of_log(options: argparse.Namespace, log: Scenario, terminal: Console) -> dict[str, Any]:
+def _of_log(options: argparse.Namespace, log: Scenario, terminal: PlainConsole) -> dict[str, Any]:
     """The matrix of a recorded log, with the detectors and attacks that fit where none are named.
 
     Raises:
@@ -151,8 +149,8 @@ def _of_log(options: argparse.Namespace, log: Scenario, terminal: Console) -> di
     for attack in asked:
         _check_fits(attack, log)
     attacks = asked if options.attack else [*filter(partial(_fits, log), map(make_spoofer, ATTACKS)), *asked]
-    games = (options.p_fa or P_FA, options.episodes or GAMES)
-    return last_of(recorded_matrices(log, detectors, attacks, *games, terminal.status))
+    games = (options.p_fa or P_FA, options.episodes or GAMES, options.seed)
+    return last_of(recorded_matrices(log, detectors, attacks, *games, terminal.progress))
 
 
 def _check_fits(attack: Attack, log: Scenario) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
-from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, share_of_alarms
+from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, share_of_alarms
 from spoofgym.console import console
 from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
@@ -49,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
         help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: ramp:0.5)")
     add("--p-fa", type=share_of_alarms, metavar="P",
         help="set every threshold to this share of alarms in the clean log, per epoch (default: as the detector says)")
+    add_seed(result, "what an attack draws; nothing else on a log is drawn")
     add_import(result)
     add_json(result)
     add_figure(result)
@@ -60,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     terminal = console(stderr=options.json == STDOUT)
-    report = _report(options, terminal.status)
+    report = _report(options, terminal.progress)
     outputs: list[Output] = [("figure", options.figure, partial(recorded_figure, report))]
     give(report, recorded_table(report), options.json, terminal, outputs)
     return 0
@@ -83,15 +84,15 @@ def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     else:
         ready = calibrated_for_play(detectors, scenario, scenario.fidelities[0])
     attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]
-    return last_of(_reports(scenario, attacks, ready, progress))
+    return last_of(_reports(scenario, attacks, ready, options.seed, progress))
 
 
 def _reports(
-    scenario: Scenario, attacks: Sequence[Attack], detectors: list[Detector], progress: Progress
+    scenario: Scenario, attacks: Sequence[Attack], detectors: list[Detector], seed: int, progress: Progress
 ) -> Iterator[dict[str, Any]]:
     """The report after every attack."""
     rows: list[dict[str, Any]] = []
-    played = recorded_rows(scenario, attacks, detectors)
+    played = recorded_rows(scenario, attacks, detectors, seed)
     for attack in attacks:
         with progress(attack.name):
             rows.append(next(played))

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from rich.console import Console, Group
+from rich.console import Group
 
 from spoofgym.attacks import ATTACKS
 from spoofgym.attacks.base import Attack
@@ -29,7 +29,7 @@ from spoofgym.command_line import (
     add_threads,
     count,
 )
-from spoofgym.console import console
+from spoofgym.console import PlainConsole, console
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.attackers import Evaluation
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _report(options: argparse.Namespace, terminal: Console) -> tuple[dict[str, Any], GameLog]:
+def _report(options: argparse.Namespace, terminal: PlainConsole) -> tuple[dict[str, Any], GameLog]:
     scenario = make_scenario(options.scenario)
     if not scenario.random:
         raise ValueError(f"{scenario.name} is a recorded log: spoofgym evaluate recorded FOLDER")
@@ -121,7 +121,7 @@ def _report(options: argparse.Namespace, terminal: Console) -> tuple[dict[str, A
     evaluation.check_layouts(policies)
     evaluation.check_attacks(attacks)
     tell_what_is_new(policies, scenario, fidelity, detectors)
-    return last_of(_reports(evaluation, policies, attacks, terminal.status)), evaluation.log
+    return last_of(_reports(evaluation, policies, attacks, terminal.progress)), evaluation.log
 
 
 def _reports(

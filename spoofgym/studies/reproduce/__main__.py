@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     terminal = console(stderr=options.json == STDOUT)
     if not terminal.is_terminal:
         terminal.width = WIDTH
-    series = reproductions(options.paper, runs, options.seed, options.quick, terminal.status)
+    series = reproductions(options.paper, runs, options.seed, options.quick, terminal.progress)
     report = last_of(series, partial(replace, complete=False))
     give(report.as_json(), reproduction_parts(report, terminal.width), options.json, terminal)
     return 0
