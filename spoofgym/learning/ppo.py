@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -27,7 +28,7 @@ from spoofgym.learning.scaled_rewards import ScaledRewards, duel_factor
 from spoofgym.policies.learned import LearnedSpoofer
 
 AnySpooferConfig = SpooferConfig | DuelSpooferConfig
-SCRIPTED_START = {"scripted": True, "trials": 1, "lanes": 128, "log_std": -3.0, "learning_rate": 1e-3}
+SCRIPTED_START: dict[str, Any] = {"scripted": True, "trials": 1, "lanes": 128, "log_std": -3.0, "learning_rate": 1e-3}
 """Settings of a training that begins with a scripted attack: noise of the usual size would give the attack away."""
 LAST_RATE = 0.02
 """Share of the learning rate at which its fall ends: the last rollout overshoots the number of steps."""

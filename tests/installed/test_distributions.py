@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import spoofgym
+from hatch_build import for_an_index
 
 pytestmark = pytest.mark.xdist_group("installed")
 
@@ -65,6 +66,7 @@ def test_the_sdist_holds_what_builds_tests_and_documents_it(distributions: Path)
     found = inside_sdist(distributions)
     folders = sources("spoofgym", "agents", "train", "tests", "benchmarks", "docs")
     files = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff", "LICENSE", "Makefile", "constraints.txt"}
+    files |= {"hatch_build.py"}
     assert found - {"PKG-INFO", ".gitignore"} == folders | files | {"pyproject.toml"}
 
 
@@ -85,6 +87,27 @@ def test_metadata_name_the_extras_the_version_and_the_command(metadata: Message,
         assert "spoofgym = spoofgym.cli.main:main" in archive.read(name).decode()
 
 
+def test_the_description_has_no_link_that_leads_nowhere(metadata: Message) -> None:
+    """An index shows it beside no checkout: the words of the README, and no relative link or picture."""
+    text = metadata.get_payload()
+    assert isinstance(text, str)
+    assert metadata["Description-Content-Type"] == "text/markdown"
+    relative = re.findall(r"\]\((?!https?:|#)[^)]*\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert len(relative) > 10
+    assert re.findall(r"\]\((?!https?:|#)[^)]*\)|(?:src|href)=\"(?!https?:)", text) == []
+    assert "# spoofgym" in text
+    assert "Three results" in text
+
+
+def test_links_of_the_description_lead_to_the_repository_where_one_is_named() -> None:
+    page = "[how](docs/a.md#b), ![map](c.gif), [web](https://example.org), [below](#d)"
+    assert for_an_index(page, None) == "how, *map*, [web](https://example.org), [below](#d)"
+    assert for_an_index(page, "https://example.org/x") == (
+        "[how](https://example.org/x/blob/HEAD/docs/a.md#b), ![map](https://example.org/x/raw/HEAD/c.gif), "
+        "[web](https://example.org), [below](#d)"
+    )
+
+
 def test_every_extra_that_is_named_anywhere_exists(metadata: Message) -> None:
     texts = [ROOT / name for name in sources("spoofgym", "docs", "agents") if name.endswith((".py", ".md"))]
     texts += [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
@@ -100,7 +123,7 @@ def test_every_extra_that_is_named_anywhere_exists(metadata: Message) -> None:
 
 def test_the_version_is_told_once_and_cited(metadata: Message) -> None:
     """The package says it; the project file reads it there, and the citation is of it."""
-    assert 'dynamic = ["version"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert 'dynamic = ["version"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert cited is not None
     assert cited.group(1) == spoofgym.__version__
