@@ -283,7 +283,8 @@ def test_tuning_ranks_the_grid(tmp_path, monkeypatch, capsys):
     best = make_response(rows[0]["response"])
     games = play_response(World(scenario, "training", 0.5, detectors), rows[0]["detector"], best, 15, tune.SEED)
     assert math.isclose(games.error.mean(), errors[0])
-    lines = capsys.readouterr().out.splitlines()
+    *lines, told = capsys.readouterr().out.splitlines()
+    assert told == f"rows in {out}"
     assert f"{DRIVE}: best of 18 defenders, 15 games each" in lines[0]
     assert all(len(line) <= 100 for line in lines)
     assert len(lines) == 2 + 12
