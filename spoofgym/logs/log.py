@@ -7,7 +7,7 @@ It is converted here, at the door; everything behind works in east-north-up, rig
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.logs.fix_rows import known_sigmas, most_wild, usable_rows
 from spoofgym.logs.mounting import find_delay, find_mounting
-from spoofgym.logs.notes import ENU_OF_NED, Notes
+from spoofgym.logs.notes import ENU_OF_NED, Notes, StatedHeading
 from spoofgym.logs.table import TIMES, check_increasing, has_table, read_table, seconds, table_path
 
 IMU_COLUMNS = ("t_s", "gx_radps", "gy_radps", "gz_radps", "ax_mps2", "ay_mps2", "az_mps2")
@@ -85,6 +85,11 @@ class Log:
         lever_arm: from the IMU to the antenna, body R, F, U, (3,), m.
         fixes: of the receiver, their delay, stated or found, subtracted.
         reference: solution to compare with; None = the log has none.
+        rotation: from the axes of the IMU to body right, forward, up, (3, 3).
+        imu_delay: that was subtracted, and belongs to every table on the IMU's clock, s.
+        alignment: the method that the log states; None = it states none.
+        heading: that the log states of its start; None = it states none.
+        declination: of the magnetic field, east of true north, rad; None = not stated.
     """
 
     name: str
@@ -96,6 +101,11 @@ class Log:
     lever_arm: Floats
     fixes: Fixes
     reference: Fixes | None
+    rotation: Floats = field(default_factory=lambda: np.eye(3))
+    imu_delay: float = 0.0
+    alignment: str | None = None
+    heading: StatedHeading | None = None
+    declination: float | None = None
 
 
 def velocity_of(fixes: Fixes) -> Floats:
@@ -218,6 +228,10 @@ def log_of(tables: Tables) -> Log:
         lever_arm=notes.lever_arm(),
         fixes=_usable_fixes(table_path(folder, "gnss"), tables.gnss, start, delay),
         reference=None if tables.reference is None else _usable_reference(folder, tables.reference, start),
+        imu_delay=notes.seconds("imu_delay_s", 0.0),
+        alignment=notes.alignment(),
+        heading=notes.heading(),
+        declination=notes.declination(),
     )
     _check_overlap(log)
     if mounting is not None:
@@ -239,7 +253,10 @@ def _motion(log: Log) -> tuple[str, Floats, Floats, Floats, Floats, Floats]:
 def _turned(log: Log, rotation: Floats, gyro_bias: Floats) -> Log:
     """The log with its samples turned from sensor axes to body right, forward, up."""
     return replace(
-        log, angular_rate=(log.angular_rate - gyro_bias) @ rotation.T, specific_force=log.specific_force @ rotation.T
+        log,
+        angular_rate=(log.angular_rate - gyro_bias) @ rotation.T,
+        specific_force=log.specific_force @ rotation.T,
+        rotation=rotation,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,14 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-SETTINGS = ("name", "imu_to_body_frd", "start_s", "imu_delay_s", "gnss_delay_s", "antenna_lever_arm_m")
+SETTINGS = (
+    *("name", "imu_to_body_frd", "start_s", "imu_delay_s", "gnss_delay_s", "antenna_lever_arm_m"),
+    *("alignment", "heading_deg", "heading_sigma_deg", "declination_deg"),
+)
+ALIGNMENTS = ("auto", "static", "attitude", "course", "coarse")
+"""What ``alignment`` may say."""
+HEADING_SIGMA = 10.0
+"""Of a heading that is stated without one, degrees."""
 REMARKS = (
     *("vehicle", "source", "licence", "license", "date", "comment", "note", "week", "time", "static"),
     *("imu", "imu_grade", "gyro_noise", "accel_noise", "gnss", "reference", "ranges", "ranges_sbas", "sky"),
@@ -42,6 +50,19 @@ FARTHEST_ANTENNA = 100.0
 
 ENU_OF_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """East, north, up from north, east, down; and right, forward, up from forward, right, down."""
+
+
+@dataclass(frozen=True)
+class StatedHeading:
+    """The heading at the start of a log.
+
+    Attributes:
+        value: clockwise from true north, rad.
+        sigma: rad.
+    """
+
+    value: float
+    sigma: float
 
 
 class Notes:
@@ -86,6 +107,46 @@ class Notes:
         if not _is_number(value):
             raise ValueError(f"{self.path}: {key} must be a finite number of seconds, got {value!r:.100}")
         return validation.time(str(self.path), key, value)
+
+    def alignment(self) -> str | None:
+        """How the filter is to be aligned; None = the file does not say.
+
+        Raises:
+            ValueError: it is none of `ALIGNMENTS`.
+        """
+        value = self._values.get("alignment")
+        return None if value is None else validation.one_of(str(self.path), "alignment", value, ALIGNMENTS)
+
+    def heading(self) -> StatedHeading | None:
+        """Of the vehicle at the start; None = the file does not say.
+
+        Raises:
+            ValueError: it is no number in range, or a sigma stands alone.
+        """
+        heading = self._degrees("heading_deg", -360.0, 360.0)
+        sigma = self._degrees("heading_sigma_deg", 0.01, 180.0)
+        if heading is None:
+            if sigma is not None:
+                raise ValueError(f"{self.path}: heading_sigma_deg stands alone; heading_deg is missing")
+            return None
+        return StatedHeading(math.radians(heading), math.radians(HEADING_SIGMA if sigma is None else sigma))
+
+    def declination(self) -> float | None:
+        """Of the magnetic field, east of true north, rad; None = the file does not say.
+
+        Raises:
+            ValueError: it is no number in range.
+        """
+        value = self._degrees("declination_deg", -180.0, 180.0)
+        return None if value is None else math.radians(value)
+
+    def _degrees(self, key: str, low: float, high: float) -> float | None:
+        value = self._values.get(key)
+        if value is None:
+            return None
+        if not _is_number(value) or not low <= value <= high:
+            raise ValueError(f"{self.path}: {key} must be a number between {low:g} and {high:g}, got {value!r:.100}")
+        return float(value)
 
     def lever_arm(self) -> Floats:
         """From the IMU to the antenna, body right, forward, up, (3,), m.

@@ -16,6 +16,8 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.logs.alignment import METHODS
+from spoofgym.logs.alignment.course import SIGMA as COURSE_SIGMA
 from spoofgym.logs.checks.check import check_ranges_of, checked_log
 from spoofgym.logs.fix_rows import DEFAULT_SIGMA
 from spoofgym.logs.lever_arm import with_velocity_at_imu
@@ -35,8 +37,6 @@ from spoofgym.specification import spell
 
 FIXES = ("phone", "ranges")
 """Which fixes a filter may take: those in the log, or those made from its raw ranges."""
-ALIGNMENT_SIGMA = (math.radians(5.0), math.radians(5.0), math.radians(10.0))
-"""Initial attitude error (E, N, U), rad: course against heading, and a mounting known to some degrees."""
 DRAG_OFF_RATE = (4.0, 4.0, 4.0)
 """Largest rate of a spoofed position per axis, and of a spoofed clock, m/s."""
 ALIGNMENT_VELOCITY_SIGMA = (0.5, 0.5, 0.5)
@@ -56,6 +56,8 @@ def recorded(
     noise_factor: float = NOISE_FACTOR,
     fixes: str = FIXES[0],
     coupling: str = COUPLINGS[0],
+    alignment: str | None = None,
+    least_speed: float | None = None,
 ) -> Scenario:
     """A log in the project's format as a game.
 
@@ -71,6 +73,9 @@ def recorded(
         fixes: which ones the filter takes: ``phone``, those in the log, whatever receiver made them, or ``ranges``,
             least squares of the log's raw ranges (`range_fixes`).
         coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of the log's raw ranges.
+        alignment: how the filter starts (`spoofgym.logs.alignment`): ``auto``, ``static``, ``attitude``, ``course`` or
+            ``coarse``; None = as ``log.toml`` says, else ``auto``.
+        least_speed: whose course counts as heading, m/s; None = 5 m/s, or what the accuracy of the velocity allows.
 
     Raises:
         ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
@@ -86,6 +91,10 @@ def recorded(
     noise_factor = validation.between("recorded", "noise_factor", noise_factor, *map(math.sqrt, NOISE_FACTORS))
     fixes = validation.one_of("recorded", "fixes", fixes, FIXES)
     coupling = validation.one_of("recorded", "coupling", coupling, COUPLINGS)
+    if alignment is not None:
+        alignment = validation.one_of("recorded", "alignment", alignment, METHODS)
+    if least_speed is not None:
+        least_speed = validation.above("recorded", "least_speed", least_speed)
     if coupling == "tight" and (velocity is not None or sigma_floor != SIGMA_FLOOR or fixes != FIXES[0]):
         raise ValueError("recorded: velocity, sigma_floor and fixes are of fixes; coupling=tight takes none")
     options = {
@@ -97,10 +106,12 @@ def recorded(
         "noise_factor": (noise_factor, NOISE_FACTOR),
         "fixes": (fixes, FIXES[0]),
         "coupling": (coupling, COUPLINGS[0]),
+        "alignment": (alignment, None),
+        "least_speed": (least_speed, None),
     }
     name = spell("recorded", path, **{key: value for key, (value, default) in options.items() if value != default})
     tuning = FilterTuning(
-        attitude_sigma=ALIGNMENT_SIGMA,
+        attitude_sigma=COURSE_SIGMA,  # replaced by that of the alignment
         velocity_sigma=ALIGNMENT_VELOCITY_SIGMA,
         position_sigma=DEFAULT_SIGMA[:3],
         initial_scale=1.0,
@@ -109,6 +120,7 @@ def recorded(
     )
     asked = _Fixes(fixes, velocity, sigma_floor)
     common = {"name": name, "grade": imu, "tuning": tuning, "onset": onset, "horizon": horizon}
+    common |= {"aligned": alignment, "least_speed": least_speed}
     log = checked_log(path)
     if coupling == "tight" or fixes == "ranges":
         check_ranges_of(path)

@@ -65,6 +65,8 @@ class RecordedFamily(Immutable, ABC):
     tuning: FilterTuning
     onset: float | None = None
     horizon: int | None = None
+    aligned: str | None = None
+    least_speed: float | None = None
 
     def __post_init__(self) -> None:
         self._check_imu(self.epoch_time[self.first], self.epoch_time[self.last])
@@ -136,7 +138,7 @@ class RecordedFamily(Immutable, ABC):
     @cached_property
     def alignment(self) -> Alignment:
         """Where the filter starts."""
-        return align(self.log)
+        return align(self.log, self.aligned, self.least_speed)
 
     @cached_property
     def first(self) -> int:
@@ -249,7 +251,7 @@ class RecordedFamily(Immutable, ABC):
             instability_decay=1.0,
             attitude=self.alignment.attitude,
             velocity=self.alignment.velocity,
-            position=self.alignment.position,
+            position=self.alignment.position(self.log),
             prior_covariance=np.diag(np.square(self.tuning.initial_scale * self._prior_sigma)),
         )
 

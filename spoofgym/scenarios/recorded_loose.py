@@ -75,6 +75,7 @@ class RecordedFixes(RecordedFamily, FixFamily):
     @property
     def _prior_sigma(self) -> Floats:
         sigma = self.tuning.initial_sigma(self.grade)
+        sigma[:3] = self.alignment.attitude_sigma
         sigma[6:9] = self._measurement_sigma[0, :3]
         return sigma
 

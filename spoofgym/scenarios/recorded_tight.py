@@ -101,6 +101,7 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     @property
     def _prior_sigma(self) -> Floats:
         sigma = self.tuning.initial_sigma(self.grade)
+        sigma[:3] = self.alignment.attitude_sigma
         stated = self.log.fixes.position_sigma
         assert stated is not None
         sigma[6:9] = stated[self.alignment.fix]
