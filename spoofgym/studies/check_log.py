@@ -55,6 +55,7 @@ def _clean_run(folder: str) -> tuple[dict[str, Any] | None, list[Finding]]:
             run, first = family.clean, int(np.searchsorted(family.epoch_time, family.align_time + SETTLING))
             first = first if first < len(family.epoch_time) else 0
             clean = {
+                "alignment": family.alignment.told(family.log),
                 "aligned_at_s": family.align_time,
                 "epochs": len(family.epoch_time),
                 "mean_nis": float(np.mean(run.nis[first:])),
@@ -73,7 +74,7 @@ def lines(report: dict[str, Any]) -> list[str]:
     clean = report["clean"]
     if clean is not None:
         nis = f"mean NIS {clean['mean_nis']:.3g}, {clean['nis_per_degree']:.3g} per degree of freedom"
-        result.append(f"{FILTER}: aligned at {clean['aligned_at_s']:.3f} s, {clean['epochs']} epochs, {nis}")
+        result += [clean["alignment"], f"{FILTER}: {clean['epochs']} epochs, {nis}"]
     errors, warned = (sum(row["severity"] == kind for row in report["findings"]) for kind in ("error", "warning"))
     told = f"{errors} errors, {warned} warnings" if errors or warned else "nothing contradicts it"
     return [*result, f"{report['log']}: {told}"]

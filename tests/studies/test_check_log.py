@@ -24,8 +24,9 @@ def test_a_good_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = write(tmp_path)
     assert main([str(folder), "--json", str(tmp_path / "report.json")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("clean run: aligned at 100")
-    assert lines[1] == f"{folder}: nothing contradicts it"
+    assert lines[0].startswith("alignment: course, at 100")
+    assert lines[1].startswith("clean run: ")
+    assert lines[2] == f"{folder}: nothing contradicts it"
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["findings"] == []
     assert 0.0 < report["clean"]["nis_per_degree"] < 1.5

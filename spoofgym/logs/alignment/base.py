@@ -22,7 +22,7 @@ class Alignment:
     """Where the filter starts.
 
     Attributes:
-        method: that found it, one of `spoofgym.logs.alignment.METHODS`.
+        method: that found it: static, attitude, course, coarse; heading where that is stated, hover where it is not.
         fix: index of the fix it starts from.
         attitude: body R, F, U to ENU, (3, 3).
         velocity: ENU, (3,), m/s.
@@ -38,7 +38,7 @@ class Alignment:
     source: str = ""
 
     def position(self, log: Log) -> Floats:
-        """Of the IMU: that of the fix, less the lever arm of the antenna; latitude rad, longitude rad, height m, (3,)."""
+        """Of the IMU: that of the fix, less the lever arm; latitude rad, longitude rad, height m, (3,)."""
         return displace(log.fixes.position[self.fix], -self.attitude @ log.lever_arm)
 
     @property

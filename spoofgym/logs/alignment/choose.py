@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym import validation
+from spoofgym.geodesy import position_difference
 from spoofgym.logs.alignment.base import Alignment
 from spoofgym.logs.alignment.coarse import GOOD_SIGMA, WINDOWS, coarse, match
 from spoofgym.logs.alignment.course import by_course
@@ -16,6 +17,8 @@ from spoofgym.logs.table import has_table, seconds
 
 METHODS = ALIGNMENTS
 AUTO = METHODS[0]
+NEAR = 20.0
+"""Of a hovering vehicle, median distance from its start, m."""
 MOST_APART = np.radians(30.0)
 """Between course and heading of a vehicle that drives forward, rad."""
 
@@ -46,7 +49,7 @@ def _first_that_fits(log: Log, least_speed: float | None) -> Alignment:
         ValueError: none fits; the message is that of the course.
     """
     if log.heading is not None:
-        return without_motion(log, _first_fix(log), "static" if resting_fixes(log)[_first_fix(log)] else "heading")
+        return without_motion(log, _first_fix(log), "heading")
     if has_table(log.folder, TABLE):
         return by_own_attitude(log)
     try:
@@ -71,10 +74,15 @@ def _without_course(log: Log, error: ValueError) -> Alignment:
     resting = np.flatnonzero(resting_fixes(log))
     if len(resting):
         return without_motion(log, int(resting[0]), "static")
-    try:
-        return without_motion(log, _first_fix(log), "hover")
-    except ValueError:
-        raise error from None
+    if not _stays(log):
+        raise ValueError(f"{error}; or state heading_deg in log.toml") from None
+    return without_motion(log, _first_fix(log), "hover")
+
+
+def _stays(log: Log) -> bool:
+    """Whether the vehicle stays near the place where it starts, so that its heading hardly matters."""
+    track = position_difference(log.fixes.position, log.fixes.position[_first_fix(log)])
+    return bool(np.median(np.hypot(track[:, 0], track[:, 1])) <= NEAR)
 
 
 def _first_fix(log: Log) -> int:

@@ -1,13 +1,13 @@
-"""Alignment at rest: level from gravity, heading stated, magnetic or unknown (Groves 2013, sections 5.6.1 and 5.6.2)."""
+"""Alignment at rest: level from gravity, heading stated, magnetic or unknown (Groves 2013, sections 5.6.1, 5.6.2)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from spoofgym.arrays import Flags, Floats
+from spoofgym.geodesy import position_difference
 from spoofgym.logs.alignment.base import Alignment, levelled
 from spoofgym.logs.alignment.headings import heading_at
-from spoofgym.logs.fix_rows import DEFAULT_SIGMA
 from spoofgym.logs.log import Log, velocity_of
 from spoofgym.logs.mounting import interval_means
 from spoofgym.logs.table import seconds
@@ -15,10 +15,12 @@ from spoofgym.logs.table import seconds
 METHOD = "static"
 WINDOW = 2.0
 """Time over which a vehicle must rest, s."""
-MOST_SPEED = 0.3
-"""Of a vehicle at rest, by a velocity of small sigma, m/s."""
+MOST_SPEED = (0.3, 0.6)
+"""Of a vehicle at rest, by a velocity of small sigma and of a large one, m/s."""
 SIGMAS = 4.0
-"""So many sigmas of the velocity may a resting vehicle seem to move."""
+"""So many sigmas of the velocity may a resting vehicle seem to move, in between."""
+SPAN = 5.0
+"""To either side of a fix, over which positions tell the speed where the receiver gives none, s."""
 MOST_RATE = np.radians(3.0)
 """Mean angular rate at rest, rad/s: the bias of a small gyro."""
 LEVEL_SIGMA = np.radians(2.0)
@@ -51,14 +53,10 @@ def without_motion(log: Log, fix: int, method: str) -> Alignment:
 
 
 def resting_fixes(log: Log) -> Flags:
-    """Whether the vehicle has been at rest since `WINDOW` before each fix, and is so at the next one, (n,).
-
-    Fixes whose velocity is not known well enough to tell do not count.
-    """
-    fixes = log.fixes
-    time, velocity = fixes.time, velocity_of(fixes)
-    sigma = _speed_sigma(log)
-    slow = np.hypot(velocity[:, 0], velocity[:, 1]) <= np.maximum(MOST_SPEED, SIGMAS * sigma)
+    """Whether the vehicle has been at rest since `WINDOW` before each fix, and is so at the next one, (n,)."""
+    time = log.fixes.time
+    velocity, sigma = _horizontal_velocity(log)
+    slow = np.hypot(velocity[:, 0], velocity[:, 1]) <= np.clip(SIGMAS * sigma, *MOST_SPEED)
     rate = np.linalg.norm(interval_means(log.imu_time, log.angular_rate, time[:-1], time[1:]), axis=1)
     still = np.concatenate([[False], slow[1:] & slow[:-1] & (rate <= MOST_RATE)])  # since the fix before
     inside = (time >= max(log.start, log.imu_time[0]) + WINDOW) & (time <= log.imu_time[-1])
@@ -70,11 +68,16 @@ def resting_fixes(log: Log) -> Flags:
     return np.asarray(resting)
 
 
-def _speed_sigma(log: Log) -> Floats:
-    """Of the horizontal velocity per axis, as stated or as differences of positions have it, (n,), m/s."""
+def _horizontal_velocity(log: Log) -> tuple[Floats, Floats]:
+    """East and north, (n, 2), and the sigma per axis, (n,), m/s: the receiver's, or of positions some seconds apart."""
     fixes = log.fixes
-    if fixes.velocity_sigma is not None:
-        return np.asarray(fixes.velocity_sigma[:, :2].max(axis=1))
-    if fixes.velocity is not None or fixes.position_sigma is None:
-        return np.full(len(fixes.time), max(DEFAULT_SIGMA[3:5]))
-    return np.asarray(np.sqrt(0.5) * fixes.position_sigma[:, :2].max(axis=1) / np.gradient(fixes.time))
+    if fixes.velocity is not None:
+        sigma = fixes.velocity_sigma
+        stated = np.zeros(len(fixes.time)) if sigma is None else sigma[:, :2].max(axis=1)
+        return fixes.velocity[:, :2], stated
+    before = np.searchsorted(fixes.time, fixes.time - SPAN)
+    after = np.searchsorted(fixes.time, fixes.time + SPAN, side="right") - 1
+    spent = np.maximum(fixes.time[after] - fixes.time[before], 1e-9)
+    track = position_difference(fixes.position, fixes.position[0])[:, :2]
+    stated = np.zeros((len(fixes.time), 3)) if fixes.position_sigma is None else fixes.position_sigma
+    return (track[after] - track[before]) / spent[:, None], np.sqrt(2.0) * stated[:, :2].max(axis=1) / spent

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spoofgym.logs.alignment import align
+from spoofgym.logs.alignment.course import by_course as align
 from spoofgym.logs.log import Log, read_log
 from tests.scenarios.test_recorded import write_log
 
