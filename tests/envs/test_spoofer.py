@@ -44,7 +44,8 @@ def play(env: gym.Env, action: np.ndarray, seed: int = 0) -> list[tuple]:
 @pytest.mark.parametrize(("knowledge", "action", "fidelity"), COMBINATIONS)
 def test_checkers_of_gymnasium_and_sb3(knowledge: str, action: str, fidelity: str) -> None:
     env = gym.make(ID, scenario=SHORT, knowledge=knowledge, action=action, fidelity=fidelity, render_mode="rgb_array")
-    check_env(env.unwrapped)  # warnings are errors
+    # warnings are errors; what is drawn does not depend on these arguments, and drawing takes longest
+    check_env(env.unwrapped, skip_render_check=(knowledge, action, fidelity) != COMBINATIONS[0])
     try:
         from stable_baselines3.common.env_checker import check_env as check_env_sb3
     except ImportError:

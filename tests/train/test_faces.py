@@ -2,7 +2,7 @@
 
 import importlib
 import re
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -24,10 +24,6 @@ MOVED = {
 }
 
 
-def run(*command):
-    return subprocess.run([sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, check=False)
-
-
 @pytest.mark.parametrize("name", ["spoofer", "defender", "league"])
 def test_a_face_is_the_program_of_the_package(name):
     face = importlib.import_module(f"train.{name}")
@@ -35,10 +31,15 @@ def test_a_face_is_the_program_of_the_package(name):
 
 
 @pytest.mark.parametrize(("old", "new"), MOVED.items())
-def test_a_moved_command_says_where_it_is(old, new):
-    result = run(old, "--scenario", "liu-flight")
-    assert (result.returncode, result.stdout) == (2, "")
-    assert result.stderr == f"error: this command has moved: spoofgym {new}\n"
+def test_a_moved_command_says_where_it_is(old, new, monkeypatch, capsys):
+    """As ``python -m`` runs it."""
+    monkeypatch.setattr(sys, "argv", [old, "--scenario", "liu-flight"])
+    for module in (old, f"{old}.__main__"):
+        if not hasattr(sys.modules.get(module), "__path__"):
+            monkeypatch.delitem(sys.modules, module, raising=False)
+    with pytest.raises(SystemExit) as end:
+        runpy.run_module(old, run_name="__main__", alter_sys=True)
+    assert (end.value.code, *capsys.readouterr()) == (2, "", f"error: this command has moved: spoofgym {new}\n")
     assert find(new.split()) is not None or new in groups()
 
 
