@@ -1,5 +1,6 @@
 """What tests keep from one run to the next lies in the test cache, or, where there is none, in a temporary folder."""
 
+import gc
 import os
 import shutil
 import signal
@@ -33,6 +34,11 @@ def pytest_configure(config: pytest.Config) -> None:
         # a window that a test opens is not on the screen of whoever runs the tests
         os.environ["SDL_VIDEODRIVER"] = "dummy"
         os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(folder / "hypothesis")
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector leave alone what was imported, which stays."""
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)  # without xdist there is no such hook
