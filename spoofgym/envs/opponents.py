@@ -58,7 +58,7 @@ def make_spoofer(given: str | Attack) -> Attack:
         FileNotFoundError: the folder holds no policy.
     """
     if isinstance(given, str) and given.strip().startswith(POOL):
-        return AttackPool([(make_spoofer(part), weight) for part, weight in _written(given)], 0.0, given.strip())
+        return AttackPool([(make_spoofer(part), weight) for part, weight in pool_parts(given)], 0.0, given.strip())
     if isinstance(given, str) and given.strip().startswith(POLICY):
         return PolicySpoofer(LearnedSpoofer.load(policy_folder(given)), given.strip())
     if isinstance(given, str) and Specification.parse(given).name in OPTIMAL:
@@ -140,7 +140,7 @@ def _unnested(text: str) -> str:
 def _members(given: Any, make: Callable[[Any], Part]) -> list[tuple[Part, float]]:
     """The members of a pool with their weights, from a specification, one part, or a sequence of parts or pairs."""
     if isinstance(given, str) and given.strip().startswith(POOL):
-        return [(make(part), weight) for part, weight in _written(given)]
+        return [(make(part), weight) for part, weight in pool_parts(given)]
     several = list(given) if isinstance(given, tuple | list) else [given]
     return [(make(item[0]), item[1]) if _is_pair(item) else (make(item), 1.0) for item in several]
 
@@ -150,7 +150,18 @@ def _is_pair(item: object) -> bool:
     return isinstance(item, tuple | list) and len(item) == 2 and not isinstance(item[1], str | Attack | Response)
 
 
-def _written(text: str) -> list[tuple[str, float]]:
+def parts_of(text: str) -> list[str]:
+    """The specifications of all parts of a pool, those of pools within it included; of anything else, itself.
+
+    Raises:
+        ValueError: what `pool_parts` refuses.
+    """
+    if not text.strip().startswith(POOL):
+        return [text]
+    return [inner for part, _ in pool_parts(text) for inner in parts_of(part)]
+
+
+def pool_parts(text: str) -> list[tuple[str, float]]:
     """The parts and weights of ``pool:A+B,weights=2+1``.
 
     Raises:

@@ -15,6 +15,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DuelGame
+from spoofgym.envs.opponents import parts_of
 from spoofgym.evaluation.episodes import batches
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.policies.classical import watcher_and_response
@@ -114,7 +115,9 @@ def _name(given: Any, found: str) -> str:
 
 
 def with_detectors_of(config: Config, defenders: Sequence[Any]) -> Config:
-    """The duel with the detectors that defenders of the form ``DETECTOR > RESPONSE`` follow, beside its own.
+    """The duel with the detectors that defenders of the form ``DETECTOR > RESPONSE``, or pools of them, follow.
+
+    They stand beside its own.
 
     All cells of a matrix are played with the same detectors, so that the same games begin in the same way.
 
@@ -123,7 +126,8 @@ def with_detectors_of(config: Config, defenders: Sequence[Any]) -> Config:
         defenders: specifications.
     """
     given = config.detectors if isinstance(config.detectors, tuple) else (config.detectors,)
-    pairs = [watcher_and_response(text) for text in defenders if isinstance(text, str)]
+    spelled = [part for text in defenders if isinstance(text, str) for part in parts_of(text)]
+    pairs = [watcher_and_response(part) for part in spelled]
     followed = [pair[0] for pair in pairs if pair is not None]
     return replace(config, detectors=tuple(dict.fromkeys([*given, *followed])))
 

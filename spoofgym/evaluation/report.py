@@ -111,11 +111,13 @@ def defenders_report(
 
 def recorded_report(scenario: Scenario, detectors: Sequence[Detector], rows: list[dict[str, Any]]) -> dict[str, Any]:
     """A whole ``"recorded"`` report."""
+    family = recorded_family(scenario)
     return {
         "schema_version": SCHEMA_VERSION,
         "kind": "recorded",
         "scenario": scenario.name,
         "fidelity": "strapdown",
+        "alignment": family.alignment.told(family.log),
         "detector": detector_entry(detectors, scenario),
         "rows": rows,
     }

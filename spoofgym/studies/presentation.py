@@ -92,7 +92,8 @@ def recorded_table(report: dict[str, Any]) -> Table:
     """A ``"recorded"`` report for the terminal."""
     table = Table(
         title=f"{report['scenario']}, {report['detector']['name']}",
-        caption="clean: horizontal error, normalised innovation squared, alarms and epochs without an attack; then the "
+        caption=f"{report['alignment']}\n"
+        "clean: horizontal error, normalised innovation squared, alarms and epochs without an attack; then the "
         "time to detect the attack, the error at the alarm, and the largest one if every fix is used",
         box=None,
         padding=(0, 2, 0, 0),

@@ -1,5 +1,7 @@
 """Cells of a payoff matrix: what a duel is worth, whoever sits where, and whatever the batches."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,12 @@ def test_all_cells_of_a_matrix_meet_the_same_noise() -> None:
 def test_detectors_that_defenders_follow_are_added_once() -> None:
     config = with_detectors_of(CONFIG, ("snapshot > latch", WATCHED, "px4-auto", WATCHED))
     assert config.detectors == ("snapshot", "windowed:n=5,threshold=60")
+
+
+def test_the_detectors_of_a_pool_are_watched_too() -> None:
+    pool = "pool:snapshot > latch+windowed:n=5/threshold=60 > exclude+px4-auto,weights=1+1+2"
+    config = with_detectors_of(replace(CONFIG, detectors=("ewma:threshold=50",)), (pool,))
+    assert config.detectors == ("ewma:threshold=50", "snapshot", "windowed:n=5,threshold=60")
 
 
 def test_a_filter_that_diverges_is_counted_once() -> None:
