@@ -8,6 +8,7 @@ from typing import Any
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.metrics import AttackerScore
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.recorded_family import recorded_family
 
 SCHEMA_VERSION = 1
 

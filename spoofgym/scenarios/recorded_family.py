@@ -14,6 +14,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.immutable import Immutable
 from spoofgym.logs.alignment import Alignment, align
+from spoofgym.logs.imu_gaps import refuse_gaps
 from spoofgym.logs.log import Log, covered, interpolate
 from spoofgym.logs.log_warning import warn
 from spoofgym.logs.table import seconds
@@ -26,8 +27,6 @@ from spoofgym.scenarios.clean_run import CleanRun, CleanRunDivergedError, coast
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.timeline import Timeline
 
-MAX_IMU_GAP = 0.5
-"""Longest time between inertial samples inside a game, s."""
 SETTLING = 30.0
 """Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
 
@@ -69,7 +68,8 @@ class RecordedFamily(Immutable, ABC):
     least_speed: float | None = None
 
     def __post_init__(self) -> None:
-        self._check_imu(self.epoch_time[self.first], self.epoch_time[self.last])
+        onset, end = float(self.epoch_time[self.first]), float(self.epoch_time[self.last])
+        refuse_gaps(f"scenario {self.name!r}", self.log.imu_time, self.align_time, onset, end)
 
     @property
     def truth(self) -> RecordedFamily:
@@ -177,18 +177,6 @@ class RecordedFamily(Immutable, ABC):
         """The epochs of the game."""
         time = self.epoch_time[self.first : self.last + 1]
         return Timeline(time, float(np.median(np.diff(time))))
-
-    def _check_imu(self, onset: float, end: float) -> None:
-        time, begin = self.log.imu_time, self.align_time
-        gaps = np.flatnonzero((np.diff(time) > MAX_IMU_GAP) & (time[1:] > begin) & (time[:-1] < end))
-        if len(gaps):
-            at, length = time[gaps[0]], time[gaps[0] + 1] - time[gaps[0]]
-            remedy = "a smaller horizon ends the game before it" if at > onset else "a later start_s begins after it"
-            raise ValueError(
-                f"scenario {self.name!r}: the IMU has a gap of {length:.3g} s at {seconds(at)} s; valid is at most "
-                f"{MAX_IMU_GAP:g} s between the alignment at {seconds(begin)} s and the end of the game at "
-                f"{seconds(end)} s; {remedy}"
-            )
 
     @cached_property
     def compared(self) -> Flags:
