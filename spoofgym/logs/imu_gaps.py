@@ -29,6 +29,6 @@ def refuse_gaps(owner: str, time: Floats, begin: float, onset: float, end: float
         at, length = time[gaps[0]], time[gaps[0] + 1] - time[gaps[0]]
         remedy = "a smaller horizon ends the game before it" if at > onset else "a later start_s begins after it"
         raise ValueError(
-            f"{owner}: the IMU has a gap of {length:.3g} s at {seconds(at)} s; valid is at most {MAX_IMU_GAP:g} s between "
-            f"the alignment at {seconds(begin)} s and the end of the game at {seconds(end)} s; {remedy}"
+            f"{owner}: the IMU has a gap of {length:.3g} s at {seconds(at)} s; valid is at most {MAX_IMU_GAP:g} s "
+            f"between the alignment at {seconds(begin)} s and the end of the game at {seconds(end)} s; {remedy}"
         )
