@@ -26,6 +26,7 @@ class Attack(ABC):
     Attributes:
         onset: scenario time from which the offset grows, s; None = the start of the game (its epoch 0, the last clean
             one).
+        end: scenario time of its last spoofed fix, s; None = it lasts to the end of the game, or does not say.
         needs_model: whether it must `study` the victim's filter.
         needs_velocity: whether the receiver must give velocity, too.
         needs_ranges: whether the filter must take ranges.
@@ -35,6 +36,7 @@ class Attack(ABC):
     """
 
     onset: float | None = None
+    end: float | None = None
     needs_model: bool = False
     needs_velocity: bool = False
     needs_ranges: bool = False

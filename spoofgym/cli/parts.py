@@ -16,7 +16,7 @@ from typing import Any
 
 from spoofgym.attacks import ATTACKS
 from spoofgym.detectors import DETECTORS, make_detector
-from spoofgym.envs.opponents import OPTIMAL, make_spoofer
+from spoofgym.envs.opponents import FITTED, make_spoofer
 from spoofgym.responses import RESPONSES, make_response
 from spoofgym.scenarios import SCENARIOS, make_scenario
 from spoofgym.specification import unknown_name, write
@@ -24,7 +24,7 @@ from spoofgym.specification import unknown_name, write
 REGISTRIES: dict[str, Mapping[str, Callable[..., Any]]] = {
     "scenarios": SCENARIOS,
     "detectors": DETECTORS,
-    "attacks": ChainMap(OPTIMAL, ATTACKS),  # a view: attacks of one's own are registered later
+    "attacks": ChainMap(FITTED, ATTACKS),  # a view: attacks of one's own are registered later
     "responses": RESPONSES,
 }
 GIVEN = {

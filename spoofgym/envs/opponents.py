@@ -25,6 +25,8 @@ from spoofgym import validation
 from spoofgym.attacks import make_attack
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.pool import POPULATIONS, AttackPool
+from spoofgym.attacks.recorded import NAME as RECORDED
+from spoofgym.attacks.recorded import Recorded
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicyDefender, PolicySpoofer
@@ -43,8 +45,8 @@ from spoofgym.scenario import Scenario
 from spoofgym.specification import Specification, build, unnest
 
 POOL = "pool:"
-OPTIMAL: dict[str, Callable[..., Attack]] = {UNSEEN: Unseen, CLOSED_FORM: Furthest}
-"""Optimal attacks, which stand below the registry of attacks."""
+FITTED: dict[str, Callable[..., Attack]] = {UNSEEN: Unseen, CLOSED_FORM: Furthest, RECORDED: Recorded}
+"""Attacks that only their game tells: optimal ones, and the one that a log holds."""
 Part = TypeVar("Part")
 
 
@@ -61,8 +63,8 @@ def make_spoofer(given: str | Attack) -> Attack:
         return AttackPool([(make_spoofer(part), weight) for part, weight in pool_parts(given)], 0.0, given.strip())
     if isinstance(given, str) and given.strip().startswith(POLICY):
         return PolicySpoofer(LearnedSpoofer.load(policy_folder(given)), given.strip())
-    if isinstance(given, str) and Specification.parse(given).name in OPTIMAL:
-        return build(given, OPTIMAL, "attack")
+    if isinstance(given, str) and Specification.parse(given).name in FITTED:
+        return build(given, FITTED, "attack")
     return make_attack(given, lambda nested: make_spoofer(_unnested(nested)))
 
 

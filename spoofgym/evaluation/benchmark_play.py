@@ -19,7 +19,7 @@ from spoofgym.detectors import make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DuelGame
-from spoofgym.envs.opponents import OPTIMAL, make_spoofer, spoofer_pool
+from spoofgym.envs.opponents import FITTED, make_spoofer, spoofer_pool
 from spoofgym.envs.trained import defender_config, trained_on
 from spoofgym.evaluation.benchmark import ATTACK, TRACKS, UNDETECTED, Benchmark, BenchmarkTask, Match, Place
 from spoofgym.evaluation.cell_store import CellStore
@@ -159,7 +159,7 @@ def check_player(track: str, text: str) -> None:
         return
     pair = watcher_and_response(given)
     name = Specification.parse(given).name if pair is None else ""
-    spoofs = name in ATTACKS or name in OPTIMAL or name in ORACLES
+    spoofs = name in ATTACKS or name in FITTED or name in ORACLES
     defends = name in RESPONSES or pair is not None
     if track == ATTACK and defends:
         raise ValueError(f"{text!r} defends: it plays the track 'defend'")

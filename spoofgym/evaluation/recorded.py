@@ -20,6 +20,8 @@ from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 from spoofgym.simulation import Simulation
 from spoofgym.validation import written
 
+RECOVERED = 1.0
+"""So near to the filter of the clean log a victim has recovered from an attack, horizontally, m."""
 SAME_TIME = 1e-3
 """A reference epoch this close to a fix, s, is that fix and no independent check."""
 
@@ -63,9 +65,11 @@ def recorded_rows(
         A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
         detected, time_to_detect_s (from the attack's onset to the first alarm owed to it), error_at_detection_m,
         max_error_m (largest horizontal error after the onset), error_epochs (after the onset, whose error is known:
-        those in a hole of the reference have none). None where a thing does not exist: clean errors without a
-        reference, the largest of no errors, time and error of a detection that did not happen. An alarm without an
-        attack is no detection, nor is one that comes at the same epoch of the clean log.
+        those in a hole of the reference have none), alarms_after_end (after the last spoofed fix, as far as the clean
+        log has none there), recovery_s (from the last spoofed fix until the filter is back within `RECOVERED` of that
+        of the clean log, for good). None where a thing does not exist: clean errors without a reference, the largest of
+        no errors, time and error of a detection that did not happen, what follows the end of an attack that has none.
+        An alarm without an attack is no detection, nor is one that comes at the same epoch of the clean log.
 
     Raises:
         ValueError: what `Simulation` refuses, or a log too short for clean figures.
@@ -179,9 +183,11 @@ def _play(
     spoofing = not isinstance(attack, NoAttack)
     detection: tuple[float, float | None] | None = None
     errors, log = [], recorded_family(scenario)
+    after_end, departed = 0, None
+    clean = position_difference(log.clean.position[1:], log.true_position)[log.first + 1 :]
     simulation.reset()
     simulation.resolve()
-    for alarmed, compared in zip(false, log.compared[log.first + 1 :], strict=False):
+    for alarmed, compared, unspoofed in zip(false, log.compared[log.first + 1 :], clean, strict=False):
         time = float(simulation.observe().time[0])
         after = time > onset
         if after and spoofing and detection is None and simulation.alarm[0] and not alarmed:
@@ -189,10 +195,18 @@ def _play(
         simulation.resolve()
         if after and compared:
             errors.append(float(horizontal(simulation.error)[0]))
+        if attack.end is not None and time > attack.end:
+            after_end += bool(simulation.alarm[0] and not alarmed)
+            if float(horizontal(simulation.error - unspoofed)[0]) > RECOVERED:
+                departed = time
+    last = float(scenario.timeline.end)
+    back = attack.end is not None and (departed is None or departed < last)
     return {
         "detected": detection is not None,
         "time_to_detect_s": None if detection is None else detection[0],
         "error_at_detection_m": None if detection is None else detection[1],
         "max_error_m": float(np.max(errors)) if errors else None,
         "error_epochs": len(errors),
+        "alarms_after_end": None if attack.end is None else after_end,
+        "recovery_s": max((departed or attack.end) - attack.end, 0.0) if back and attack.end is not None else None,
     }

@@ -90,6 +90,8 @@ class Log:
         alignment: the method that the log states; None = it states none.
         heading: that the log states of its start; None = it states none.
         declination: of the magnetic field, east of true north, rad; None = not stated.
+        fix_delay: that was subtracted from the times of the fixes, s.
+        attacked: times of the first and the last spoofed fix in the table, s; None = not stated.
     """
 
     name: str
@@ -106,6 +108,8 @@ class Log:
     alignment: str | None = None
     heading: StatedHeading | None = None
     declination: float | None = None
+    fix_delay: float = 0.0
+    attacked: tuple[float, float] | None = None
 
 
 def velocity_of(fixes: Fixes) -> Floats:
@@ -232,13 +236,15 @@ def log_of(tables: Tables) -> Log:
         alignment=notes.alignment(),
         heading=notes.heading(),
         declination=notes.declination(),
+        fix_delay=delay,
+        attacked=notes.attacked(),
     )
     _check_overlap(log)
     if mounting is not None:
         return _turned(log, mounting, np.zeros(3))
     if "gnss_delay_s" not in notes:
         found_delay = find_delay(*_motion(log))
-        log = replace(log, fixes=replace(log.fixes, time=log.fixes.time - found_delay))
+        log = replace(log, fixes=replace(log.fixes, time=log.fixes.time - found_delay), fix_delay=found_delay)
     found = find_mounting(*_motion(log))
     return _turned(log, found.rotation, found.gyro_bias)
 

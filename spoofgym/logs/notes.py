@@ -21,7 +21,7 @@ else:
 
 SETTINGS = (
     *("name", "imu_to_body_frd", "start_s", "imu_delay_s", "gnss_delay_s", "antenna_lever_arm_m"),
-    *("alignment", "heading_deg", "heading_sigma_deg", "declination_deg"),
+    *("alignment", "heading_deg", "heading_sigma_deg", "declination_deg", "attack_start_s", "attack_end_s"),
 )
 ALIGNMENTS = ("auto", "static", "attitude", "course", "coarse")
 """What ``alignment`` may say."""
@@ -30,7 +30,7 @@ HEADING_SIGMA = 10.0
 REMARKS = (
     *("vehicle", "source", "licence", "license", "date", "comment", "note", "week", "time", "static"),
     *("imu", "imu_grade", "gyro_noise", "accel_noise", "gnss", "reference", "ranges", "ranges_sbas", "sky"),
-    *("wheels", "attitude", "aux", "gnss_spoofed", "attack", "victim", "attack_start_s", "attack_end_s"),
+    *("wheels", "attitude", "aux", "gnss_spoofed", "attack", "victim"),
     *("first_offset_n_m", "first_offset_e_m", "largest_offset_m", "first_effect_s", "power_step_s"),
     *("pull_start_s", "pull_full_s", "pull_slows_s", "pull_end_s", "pull_m", "range_rate_bias_mps"),
     *("antenna_lat_deg", "antenna_lon_deg", "antenna_h_m", "rrt0_s", "iono_alpha", "iono_beta"),
@@ -139,6 +139,19 @@ class Notes:
         """
         value = self._degrees("declination_deg", -180.0, 180.0)
         return None if value is None else math.radians(value)
+
+    def attacked(self) -> tuple[float, float] | None:
+        """Times of the first and the last spoofed fix, s; None = the file states none.
+
+        Raises:
+            ValueError: one is missing or no number, or the end lies before the start.
+        """
+        if "attack_start_s" not in self and "attack_end_s" not in self:
+            return None
+        begin, end = self.seconds("attack_start_s", None), self.seconds("attack_end_s", None)
+        if end < begin:
+            raise ValueError(f"{self.path}: attack_end_s = {end:g} lies before attack_start_s = {begin:g}")
+        return begin, end
 
     def _degrees(self, key: str, low: float, high: float) -> float | None:
         value = self._values.get(key)

@@ -10,6 +10,7 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.logs.fix_rows import UNMEASURED_SIGMA
 from spoofgym.logs.log import velocity_of
+from spoofgym.logs.spoofed_fixes import RecordedSpoof, recorded_spoof
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.facts import INERTIAL_SOLUTION
 from spoofgym.navigation.interface import Demands
@@ -105,6 +106,10 @@ class RecordedFixes(RecordedFamily, FixFamily):
             run = clean_run(self.model)
         self._warn_of_large_innovations(run)
         return run
+
+    def recorded_spoof(self) -> RecordedSpoof:
+        """The real attack that the log holds; raises as `spoofgym.logs.spoofed_fixes.recorded_spoof`."""
+        return recorded_spoof(self.log)
 
     def navigator(
         self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices

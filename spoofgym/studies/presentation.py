@@ -94,7 +94,8 @@ def recorded_table(report: dict[str, Any]) -> Table:
         title=f"{report['scenario']}, {report['detector']['name']}",
         caption=f"{report['alignment']}\n"
         "clean: horizontal error, normalised innovation squared, alarms and epochs without an attack; then the "
-        "time to detect the attack, the error at the alarm, and the largest one if every fix is used",
+        "time to detect the attack, the error at the alarm, and the largest one if every fix is used"
+        + ("; alarms later, back: after the last spoofed fix" if _ends(report) else ""),
         box=None,
         padding=(0, 2, 0, 0),
     )
@@ -111,7 +112,11 @@ def recorded_table(report: dict[str, Any]) -> Table:
         "worst\nm",
     ):
         table.add_column(title, justify="right", no_wrap=True)
+    ends = _ends(report)
+    for title in ("alarms\nlater", "back\ns") if ends else ():
+        table.add_column(title, justify="right", no_wrap=True)
     for row in report["rows"]:
+        later = (number(row["alarms_after_end"], "d"), number(row["recovery_s"], ".1f")) if ends else ()
         table.add_row(
             row["attack"],
             number(row["clean_error_median_m"], ".2f"),
@@ -123,8 +128,14 @@ def recorded_table(report: dict[str, Any]) -> Table:
             number(row["time_to_detect_s"], ".1f"),
             number(row["error_at_detection_m"]),
             number(row["max_error_m"]),
+            *later,
         )
     return table
+
+
+def _ends(report: dict[str, Any]) -> bool:
+    """Whether an attack of a ``"recorded"`` report ends before the log."""
+    return any(row["alarms_after_end"] is not None for row in report["rows"])
 
 
 def recorded_figure(report: dict[str, Any], path: Path) -> None:

@@ -1,0 +1,64 @@
+"""The real attack that a recorded log holds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from spoofgym.arrays import Flags, Floats
+from spoofgym.attacks.base import Attack
+from spoofgym.navigation.interface import Clock
+from spoofgym.validation import written
+
+NAME = "recorded"
+
+
+class Recorded(Attack):
+    """The attack in ``gnss_spoofed.csv`` of a log: the victim gets these fixes in place of the true ones.
+
+    Position and velocity are spoofed as they were recorded. Only a scenario ``recorded:FOLDER`` with fixes can be
+    attacked with it.
+    """
+
+    @property
+    def name(self) -> str:
+        """The specification that builds this attack."""
+        return NAME
+
+    def join(self, simulation: Any) -> None:
+        """Take the recorded offsets of the game's epochs.
+
+        Raises:
+            ValueError: the scenario has no recorded attack, or the game does not begin before it.
+        """
+        scenario = simulation.scenario
+        read = getattr(scenario.family, "recorded_spoof", None)
+        if read is None:
+            raise ValueError(
+                f"attack {NAME!r} needs a recorded log whose fixes the filter takes, recorded:FOLDER with "
+                f"gnss_spoofed.csv in it; scenario {scenario.name!r} is none"
+            )
+        spoof = read()
+        times = self._timeline.times
+        if not times[0] < spoof.begin <= times[-1]:
+            raise ValueError(
+                f"attack {NAME!r}: it begins at {written(spoof.begin)} s, the game lasts from {written(times[0])} to "
+                f"{written(times[-1])} s: choose an onset before it, and a horizon that reaches it"
+            )
+        place = np.searchsorted(spoof.time, times - 1e-6)
+        self._offsets, self._velocities = spoof.offset[place], spoof.velocity[place]
+        self._begin, self.end = spoof.begin, spoof.end
+        self._onset = self.onset = float(times[times < spoof.begin - 1e-6][-1])
+
+    def offset(self, clock: Clock) -> Floats:
+        """What the spoofed fix adds to the true position, (N, 3), m ENU."""
+        return np.asarray(self._offsets[np.maximum(clock.index, 0)])
+
+    def velocity(self, clock: Clock, rate: Floats) -> Floats:
+        """What it adds to the true velocity, (N, 3), m/s ENU."""
+        return np.asarray(self._velocities[np.maximum(clock.index, 0)])
+
+    def active(self, clock: Clock) -> Flags:
+        """Whether the victim gets spoofed fixes, (N,)."""
+        return np.asarray((clock.time > self._onset) & (clock.time <= self.end + 1e-6))
