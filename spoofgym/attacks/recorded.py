@@ -48,7 +48,7 @@ class Recorded(Attack):
             )
         place = np.searchsorted(spoof.time, times - 1e-6)
         self._offsets, self._velocities = spoof.offset[place], spoof.velocity[place]
-        self._begin, self.end = spoof.begin, spoof.end
+        self._last = self.end = spoof.end
         self._onset = self.onset = float(times[times < spoof.begin - 1e-6][-1])
 
     def offset(self, clock: Clock) -> Floats:
@@ -61,4 +61,4 @@ class Recorded(Attack):
 
     def active(self, clock: Clock) -> Flags:
         """Whether the victim gets spoofed fixes, (N,)."""
-        return np.asarray((clock.time > self._onset) & (clock.time <= self.end + 1e-6))
+        return np.asarray((clock.time > self._onset) & (clock.time <= self._last + 1e-6))

@@ -28,6 +28,8 @@ KEYS = [
     "error_at_detection_m",
     "max_error_m",
     "error_epochs",
+    "alarms_after_end",
+    "recovery_s",
 ]
 DATA = Path(__file__).parents[3] / "shared" / "data"
 CLEAN_BOUNDS = {"car-rtk": 0.15, "car-loop": 0.8, "car-long-loop": 0.8, "uav-thor": 1.0}
