@@ -22,8 +22,9 @@ NOT_NUMERICAL = (
     *("test_conftest.py", "test_console.py", "test_copies.py", "test_files.py", "test_house.py"),
     *("test_other_kernels.py", "test_package.py", "test_program.py", "test_readme.py", "test_specification.py"),
     *("test_stress.py", "test_tutorial.py", "test_validation.py"),
-    *("attacks/test_families.py", "navigation/test_consistency.py", "optimum/test_bayes_estimates.py"),
-    *("optimum/test_bayes_schedule.py", "responses/test_backtrack_into_manoeuvre.py", "sensors/test_confounders.py"),
+    *("attacks/test_families.py", "navigation/test_consistency.py", "optimum/test_bayes_choosers.py"),
+    *("optimum/test_bayes_estimates.py", "optimum/test_bayes_posterior.py", "optimum/test_bayes_schedule.py"),
+    *("responses/test_backtrack_into_manoeuvre.py", "sensors/test_confounders.py"),
     *("envs/test_actions.py", "envs/test_copied_games.py", "envs/test_duel.py", "envs/test_duel_sides.py"),
     *("envs/test_frames.py", "envs/test_policies_within.py", "envs/test_policy_opponents.py", "envs/test_recording.py"),
     *("envs/test_rendering.py", "envs/test_sb3.py", "envs/test_spoofer_figure.py", "envs/test_tight_pages.py"),
@@ -34,8 +35,8 @@ NOT_NUMERICAL = (
     *("logs/test_reference.py", "logs/test_table.py", "scenarios/test_cache.py", "scenarios/test_recorded_scenario.py"),
 )
 """Files that are left out: programs, pages, importers, learners, who plays, files, words, copies, refused actions, what
-is found in a log, what is kept on disk, and shares and means of simulated games, which rounding does not move. All else
-is numerical, what is added included."""
+is found in a log, what is kept on disk, and what rounding does not move: shares and means of simulated games, and a
+posterior that a grid approximates. All else is numerical, what is added included."""
 NOT_NUMERICAL_EITHER = (
     "detectors/test_acceleration.py::test_the_spread_in_clean_games_is_that_of_the_receiver",
     "detectors/test_on_ranges.py::test_every_family_has_the_false_alarms_that_were_asked_for",
