@@ -65,8 +65,9 @@ def test_every_environment_takes_the_object(trajectory):
     for name, arguments in (
         ("Spoofer", {"knowledge": "shadow"}),
         ("Defender", {"detectors": "snapshot"}),
-        ("DuelSpoofer", {"defender": "snapshot > exclude"}),
-        ("DuelDefender", {"detectors": "snapshot"}),  # the usual ones would be calibrated
+        # the usual detectors of a duel would be calibrated
+        ("DuelSpoofer", {"defender": "snapshot > exclude", "detectors": "snapshot"}),
+        ("DuelDefender", {"detectors": "snapshot"}),
     ):
         environment = gym.make(f"spoofgym/{name}-v0", scenario=scenario, **arguments)
         environment.reset(seed=0)
