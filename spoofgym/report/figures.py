@@ -203,21 +203,38 @@ class Lines(Figure):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stanford(Figure):
+class Diagram:
     """A Stanford diagram: error, protection level and alert limit of epochs.
 
     Attributes:
+        name: of whose protection level it is.
+        choice: of what was played.
         alert_limit: m.
         edges: of the cells, m.
         cells: (error cell, level cell, epochs) where there are any.
         regions: name and epochs of each region.
     """
 
-    type: ClassVar[str] = "stanford"
+    name: str
+    choice: str
     alert_limit: float
     edges: Sequence[float]
     cells: Sequence[tuple[int, int, int]]
     regions: Sequence[tuple[str, int]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stanford(Figure):
+    """Stanford diagrams side by side; the reader chooses what was played.
+
+    Attributes:
+        diagrams: of all that was played.
+        chosen: what is shown first.
+    """
+
+    type: ClassVar[str] = "stanford"
+    diagrams: Sequence[Diagram]
+    chosen: str
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from collections.abc import Iterator, Sequence
 from importlib.resources import files as resources
 from pathlib import Path
@@ -57,6 +58,7 @@ def page(sections: Sequence[Section], title: str) -> str:
     body = "\n".join(_section(number, section, places, alone) for number, section in enumerate(sections))
     return Template(_asset("page.html")).substitute(
         title=html.escape(title),
+        heading=_breakable(title),
         styles="\n".join(_asset(name) for name in STYLES),
         licence=_asset(LICENCE).strip(),
         library=_asset(LIBRARY),
@@ -78,6 +80,11 @@ def _asset(name: str) -> str:
     return resources("spoofgym.report").joinpath(ASSETS, name).read_text(encoding="utf-8")
 
 
+def _breakable(text: str) -> str:
+    """Text whose specifications break between their options rather than within a word."""
+    return re.sub(r"([,:/+])(?=[^\s\d])", r"\1<wbr>", html.escape(text, quote=False))
+
+
 def _contents(sections: Sequence[Section]) -> str:
     """Links to the sections, where there are several."""
     if len(sections) < 2:
@@ -92,10 +99,10 @@ def _contents(sections: Sequence[Section]) -> str:
 def _section(number: int, section: Section, places: Iterator[int], alone: bool) -> str:
     """A section; the title of one that is ``alone`` is that of the page, and is not shown twice."""
     facts = "".join(
-        f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd></div>" for name, text in section.facts
+        f"<div><dt>{html.escape(name)}</dt><dd>{_breakable(text)}</dd></div>" for name, text in section.facts
     )
     figures = "\n".join(_figure(next(places), figure) for figure in section.figures)
-    heading = f'<h2 id="section-{number}"{" class=alone" if alone else ""}>{html.escape(section.title)}</h2>'
+    heading = f'<h2 id="section-{number}"{" class=alone" if alone else ""}>{_breakable(section.title)}</h2>'
     return (
         f'<section aria-labelledby="section-{number}">\n{heading}\n'
         + (f'<dl class="facts">{facts}</dl>\n' if facts else "")

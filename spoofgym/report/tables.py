@@ -87,7 +87,8 @@ def percent(share: float | None) -> float | None:
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in row.items():
-        if INTERVAL in name and (value is None or (isinstance(value, list) and len(value) == 2)):
+        pair = value is None or (isinstance(value, list) and len(value) == 2)
+        if pair and (INTERVAL in name or name == "interval"):
             low, high = value or (None, None)
             flat |= {f"{name} from": low, f"{name} to": high}
         elif value is None or isinstance(value, str | int | float | bool):

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -82,15 +81,25 @@ def _reports(
             with progress(f"{name} plays"):
                 played = played_again(name, card, games)
         for told, found in zip(card.scores, played, strict=True):
-            rows.append(
-                {
-                    **dict(zip(COLUMNS, _row(card, told), strict=True)),
-                    "card": asdict(told),
-                    "again": None if found is None else asdict(found),
-                    "holds": None if found is None else overlap(told, found),
-                }
-            )
+            rows.append(_content(card, told, found))
         yield {"schema_version": SCHEMA_VERSION, "kind": "agents", "rows": list(rows)}
+
+
+def _content(card: Card, told: Score, found: Score | None) -> dict[str, Any]:
+    """A row of the report: what the card tells, and what came of playing again."""
+    return {
+        **dict(zip(COLUMNS, _row(card, told), strict=True)),
+        "metric": told.metric,
+        "unit": told.unit,
+        "value": told.value,
+        "ci95": list(told.interval),
+        "games": told.games,
+        "seed": told.seed,
+        "again": None if found is None else found.value,
+        "again_ci95": None if found is None else list(found.interval),
+        "again_games": None if found is None else found.games,
+        "holds": None if found is None else overlap(told, found),
+    }
 
 
 def _table(report: dict[str, Any], again: bool) -> Table:
@@ -100,7 +109,8 @@ def _table(report: dict[str, Any], again: bool) -> Table:
     for row in report["rows"]:
         cells = [row[column] for column in COLUMNS]
         if row["again"] is not None:
-            cells.append(f"{shown(Score(**row['again']))}{'' if row['holds'] else ', does not hold'}")
+            told = _written(row["again"], row["again_ci95"], row["unit"])
+            cells.append(f"{told}{'' if row['holds'] else ', does not hold'}")
         table.add_row(*cells)
     return table
 
@@ -131,8 +141,12 @@ def overlap(one: Score, other: Score) -> bool:
 
 def shown(score: Score) -> str:
     """A score with its interval."""
-    low, high = score.interval
-    return f"{score.value:.3g} ±{0.5 * (high - low):.2g} {score.unit}"
+    return _written(score.value, score.interval, score.unit)
+
+
+def _written(value: float, interval: Sequence[float], unit: str) -> str:
+    low, high = interval
+    return f"{value:.3g} ±{0.5 * (high - low):.2g} {unit}"
 
 
 def _row(card: Card, score: Score) -> tuple[str, ...]:

@@ -16,16 +16,33 @@
     return value === null || value === undefined ? "–" : String(value);
   }
 
+  const LONG = 40; // letters of a text that is folded
+
+  const look = (value) => (typeof value !== "string" ? null : value.length > LONG ? "text long" : "text");
+
+  const UNITS = { m: "m", s: "s", mps: "m/s" };
+  const WORDS = { ci95: "95 %", arl0: "ARL₀", rmse: "RMSE", p95: "95 %" };
+
+  /** The name of a column in words: `mean_error_m` is "mean error, m". What is no name of a value stays as it is. */
+  page.inWords = (name) => {
+    if (!/^[a-z0-9_ ]+$/.test(name)) return name;
+    const [value, end] = name.match(/^(.*?)( from| to)?$/).slice(1);
+    const parts = value.split("_");
+    const unit = parts.length > 1 ? UNITS[parts[parts.length - 1]] : undefined;
+    const words = (unit ? parts.slice(0, -1) : parts).map((part) => WORDS[part] || part).join(" ");
+    return `${words}${end || ""}${unit ? `, ${unit}` : ""}`;
+  };
+
   page.sortedTable = (table, label) => {
     const body = page.element("tbody");
     const heads = table.columns.map((column, place) => {
-      const button = page.element("button", { type: "button", click: () => sort(place) }, column);
+      const button = page.element("button", { type: "button", click: () => sort(place) }, page.inWords(column));
       return page.element("th", { scope: "col", class: table.rows.some((row) => typeof row[place] === "string" && row[place] !== "inf") ? "text" : null }, button);
     });
     const fill = (rows) =>
       body.replaceChildren(
         ...rows.map((row) =>
-          page.element("tr", {}, ...row.map((value) => page.element("td", { class: typeof value === "string" ? "text" : null }, written(value)))),
+          page.element("tr", {}, ...row.map((value) => page.element("td", { class: look(value) }, written(value)))),
         ),
       );
 
@@ -38,7 +55,7 @@
     }
 
     fill(table.rows);
-    const grid = page.element("table", {}, page.element("thead", {}, page.element("tr", {}, ...heads)), body);
+    const grid = page.element("table", { class: "sorted" }, page.element("thead", {}, page.element("tr", {}, ...heads)), body);
     return page.element("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": `Table: ${label}` }, grid);
   };
 })();

@@ -1,4 +1,4 @@
-// A Stanford diagram: epochs by error and protection level, over the four regions that the alert limit makes.
+// Stanford diagrams: epochs by error and protection level, over the four regions that the alert limit makes.
 "use strict";
 
 (() => {
@@ -11,11 +11,13 @@
 
   function draw(node, figure) {
     const width = Math.min(page.width(node), 560);
+    const total = figure.regions.reduce((sum, [, count]) => sum + count, 0) || 1;
+    const told = figure.regions.map(([name, count]) => `${name} ${page.percent(count / total)}`).join(", ");
     const height = width - 6;
     const end = figure.edges[figure.edges.length - 1];
     const x = page.linear([0, end], [52, width - 12]);
     const y = page.linear([0, end], [height - 44, 10]);
-    const drawing = page.drawing(width, height, figure.title);
+    const drawing = page.drawing(width, height, `${figure.name}, ${figure.choice}: ${told}`);
     REGIONS.forEach(({ corners, fill }) => {
       if (fill === "none") return;
       const d = `${page.path(corners(figure.alert_limit, end).map(([a, b]) => [x(a), y(b)]))}Z`;
@@ -44,23 +46,39 @@
     drawing.append(page.svg("text", { x: x(end) - 4, y: y(limit) - 5, "text-anchor": "end" }, "alert limit"));
     drawing.append(page.svg("text", { x: (52 + width - 12) / 2, y: height - 8, "text-anchor": "middle", class: "muted" }, "error, m (last column: and beyond)"));
     drawing.append(page.svg("text", { transform: `translate(12 ${(height - 34) / 2}) rotate(-90)`, "text-anchor": "middle", class: "muted" }, "protection level, m (last row: and beyond)"));
-    const total = figure.regions.reduce((sum, [, count]) => sum + count, 0) || 1;
     const legend = figure.regions.map(([name, count], place) => ({
       name: `${name}: ${count} (${page.percent(count / total)})`,
       colour: REGIONS[place].fill === "none" ? page.colour("ink") : page.colour(REGIONS[place].fill),
       shape: ["circle", "triangle", "diamond", "square"][place],
     }));
-    node.replaceChildren(page.legend(legend), drawing);
+    node.replaceChildren(page.element("h4", {}, figure.name), page.legend(legend), drawing);
   }
 
   page.figures.stanford = (node, figure) => {
-    const redraw = () => draw(node, figure);
+    const choices = [...new Set(figure.diagrams.map((diagram) => diagram.choice))];
+    let chosen = Math.max(choices.indexOf(figure.chosen), 0);
+    const pair = page.element("div", { class: "pair" });
+
+    function redraw() {
+      const shown = figure.diagrams.filter((diagram) => diagram.choice === choices[chosen]);
+      const sheets = shown.map(() => page.element("div", { class: "sheet" }));
+      pair.replaceChildren(...sheets);
+      shown.forEach((diagram, place) => draw(sheets[place], diagram));
+    }
+
+    const choice = page.choice("Signals", choices, chosen, (index) => {
+      chosen = index;
+      redraw();
+    });
+    node.append(page.element("div", { class: "controls" }, choice), pair);
     redraw();
     page.onResize(node, redraw);
     page.onTheme(redraw);
     return () => ({
-      columns: ["error from, m", "error to, m", "protection level from, m", "protection level to, m", "epochs"],
-      rows: figure.cells.map(([column, row, count]) => [figure.edges[column], figure.edges[column + 1], figure.edges[row], figure.edges[row + 1], count]),
+      columns: ["signals", "level", "error from, m", "error to, m", "protection level from, m", "protection level to, m", "epochs"],
+      rows: figure.diagrams.flatMap(({ choice, name, edges, cells }) =>
+        cells.map(([column, row, count]) => [choice, name, edges[column], edges[column + 1], edges[row], edges[row + 1], count]),
+      ),
     });
   };
 })();
