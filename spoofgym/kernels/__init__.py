@@ -24,7 +24,7 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        # without the wrapper by which numba passes a function as a value, which no kernel does: it takes long to compile
+        # without the wrapper by which numba passes a function as a value, which no kernel does: it compiles slowly
         kernel: Any = numba.njit(**{"no_cfunc_wrapper": True, **options})(function)
         # with NUMBA_DISABLE_JIT it is the function itself
         if cache and kernel is not function:
