@@ -51,7 +51,9 @@ distclean: clean ## remove .venv, too
 	rm -rf .venv
 
 # ---- installation: a stamp per set of packages, so that a second call does nothing;
-# bytecode is compiled at the end, on all cores (pip would use one), but not that of the packages' own tests
+# bytecode is compiled at the end, on all cores (pip would use one), but not that of large parts that nothing here imports
+
+UNUSED := /(tests|sympy|mpmath|networkx|pip|setuptools|torch/(_dynamo|_inductor|distributed|testing))/
 
 .venv/.installed-train: EXTRAS := train
 .venv/.installed-dev:   EXTRAS := train,dev
@@ -64,7 +66,7 @@ ifdef UV
 else
 	$(BIN) -m pip install --no-compile --disable-pip-version-check -c constraints.txt -e ".[$(EXTRAS)]"
 endif
-	@$(BIN) -m compileall -qq -j 0 -x '/tests/' .venv/lib >/dev/null 2>&1 || true
+	@$(BIN) -m compileall -qq -j 0 -x '$(UNUSED)' .venv/lib >/dev/null 2>&1 || true
 	@touch $@
 
 $(BIN):
