@@ -30,7 +30,7 @@ NOT_NUMERICAL = (
     *("envs/test_rendering.py", "envs/test_sb3.py", "envs/test_spoofer_figure.py", "envs/test_tight_pages.py"),
     *("envs/test_trained.py", "envs/test_window.py"),
     *("evaluation/test_benchmark_play.py", "evaluation/test_engine.py", "evaluation/test_game_trace.py"),
-    *("evaluation/test_recorded.py", "evaluation/test_recorded_ranges.py"),
+    *("evaluation/test_recorded.py", "evaluation/test_recorded_matrix.py", "evaluation/test_recorded_ranges.py"),
     *("logs/test_clock_steps.py", "logs/test_mutants.py", "logs/test_notes.py", "logs/test_range_fixes.py"),
     *("logs/test_reference.py", "logs/test_table.py", "scenarios/test_cache.py", "scenarios/test_recorded_scenario.py"),
 )
