@@ -247,7 +247,7 @@ def check_report(report: Reproduction) -> dict[str, Row]:
     assert parsed["paper"] == report.paper
     assert parsed["quick"] is True
     for row in parsed["rows"]:
-        assert set(row) == {"item", "paper_value", "value", "interval", "verdict", "reason"}
+        assert set(row) == {"group", "item", "paper_value", "value", "interval", "verdict", "reason"}
         assert row["verdict"] in VERDICTS
         assert row["reason"].endswith(".")
         assert row["interval"] is None or len(row["interval"]) == 2

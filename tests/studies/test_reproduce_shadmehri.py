@@ -83,6 +83,8 @@ def test_rows_have_every_setup_and_figures_of_the_paper():
     assert report.paper == "shadmehri-2025"
     titles = [group.title for group in report.groups]
     assert len(titles) == len(set(titles)) == 8
+    named = [(row["group"], row["item"]) for row in report.as_json()["rows"]]
+    assert len(set(named)) == len(named), "a row is told by its group and its item"
     printed = [row.paper_value for group in report.groups[:4] for row in group.rows]
     assert printed == ["never", 3.41, 1.91, 0.35, 0.22, 0.11] * 4
     assert sum("false alarms per epoch" in row.item for row in report.rows) == len(shadmehri_2025.SETUPS)

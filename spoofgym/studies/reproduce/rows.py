@@ -263,6 +263,6 @@ class Reproduction:
             "runs": self.runs,
             "seed": self.seed,
             "quick": self.quick,
-            "rows": [row.as_json() for row in self.rows],
+            "rows": [{"group": group.title, **row.as_json()} for group in self.groups for row in group.rows],
             **({} if self.complete else {COMPLETE: False}),
         }
