@@ -18,6 +18,7 @@ from spoofgym.attacks.families import (
     SignChangingRamp,
     TwoStageRamp,
 )
+from spoofgym.attacks.frozen import Frozen
 from spoofgym.attacks.fusion_ripper import FusionRipper
 from spoofgym.attacks.meaconing import Meaconing
 from spoofgym.attacks.noise_matched import NoiseMatched
@@ -87,6 +88,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "exponential": Exponential,
     "circle": Circle,
     "meaconing": Meaconing,
+    "frozen": Frozen,
     "fusion-ripper": FusionRipper,
     "noise-matched": NoiseMatched,
     "azimuth": Azimuth,
