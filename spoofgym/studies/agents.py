@@ -26,7 +26,7 @@ from spoofgym.evaluation.agent_scores import agent_scores
 from spoofgym.evaluation.progress import Progress
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.policies.card import Card, Score, read_card
-from spoofgym.policies.learned import load_policy
+from spoofgym.policies.learned import SPOOFER, load_policy
 from spoofgym.policies.published import policy_folder, published_names
 from spoofgym.program import FAILURE, last_of, moved, program
 from spoofgym.studies.giving import give
@@ -150,7 +150,9 @@ def _written(value: float, interval: Sequence[float], unit: str) -> str:
 
 
 def _row(card: Card, score: Score) -> tuple[str, ...]:
-    scenario, knows = str(card.arguments.get("scenario", "")), str(card.arguments.get("knowledge", "statistics"))
+    scenario = str(card.arguments.get("scenario", ""))
+    # in a duel the knowledge is that of the spoofer
+    knows = str(card.arguments.get("knowledge", "")) if card.role == SPOOFER else "statistics"
     return card.name, card.role, scenario, knows, score.opponent, f"{score.metric} {shown(score)}"
 
 
