@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from spoofgym import validation
 from spoofgym.attacks.azimuth import FOI_ATTACKS, Azimuth
@@ -106,14 +106,19 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
 }
 
 
-def make_attack(attack: str | Attack, inside: Inside = _nested) -> Attack:
+def make_attack(
+    attack: str | Attack, inside: Inside = _nested, further: Mapping[str, Callable[..., Attack]] | None = None
+) -> Attack:
     """The attack that a specification names; an object is returned as it is.
 
     Args:
         attack: a specification or an object.
         inside: makes the attack within one that wraps another; by default from the attacks named here.
+        further: attacks beside those named here.
 
     Raises:
         ValueError: unknown name or option, or a value that does not fit; the message lists the valid ones.
     """
-    return attack if isinstance(attack, Attack) else build(attack, ATTACKS | _around(inside), "attack")
+    if isinstance(attack, Attack):
+        return attack
+    return build(attack, {**ATTACKS, **_around(inside), **(further or {})}, "attack")

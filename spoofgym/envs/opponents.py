@@ -42,7 +42,7 @@ from spoofgym.responses.base import Response
 from spoofgym.responses.pool import ResponsePool
 from spoofgym.responses.watching import Watching
 from spoofgym.scenario import Scenario
-from spoofgym.specification import Specification, build, unnest
+from spoofgym.specification import Specification, unnest
 
 POOL = "pool:"
 FITTED: dict[str, Callable[..., Attack]] = {UNSEEN: Unseen, CLOSED_FORM: Furthest, RECORDED: Recorded}
@@ -63,9 +63,7 @@ def make_spoofer(given: str | Attack) -> Attack:
         return AttackPool([(make_spoofer(part), weight) for part, weight in pool_parts(given)], 0.0, given.strip())
     if isinstance(given, str) and given.strip().startswith(POLICY):
         return PolicySpoofer(LearnedSpoofer.load(policy_folder(given)), given.strip())
-    if isinstance(given, str) and Specification.parse(given).name in FITTED:
-        return build(given, FITTED, "attack")
-    return make_attack(given, lambda nested: make_spoofer(_unnested(nested)))
+    return make_attack(given, lambda nested: make_spoofer(_unnested(nested)), FITTED)
 
 
 def spoofer_pool(attacks: Any, clean: float) -> AttackPool:

@@ -12,13 +12,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from spoofgym import validation
 from spoofgym.arrays import Flags, Floats
 from spoofgym.envs.duel_config import DuelConfig
-from spoofgym.envs.duel_game import DuelGame
-from spoofgym.envs.opponents import parts_of
+from spoofgym.envs.duel_game import OWNER, DuelGame
+from spoofgym.envs.opponents import make_defender, parts_of, spoofer_pool
 from spoofgym.evaluation.episodes import batches
 from spoofgym.evaluation.metrics import mean_interval
 from spoofgym.policies.classical import watcher_and_response
+from spoofgym.scenarios import make_scenario
 
 LANES = 1000
 """Games that are played together; what a game is worth does not depend on it."""
@@ -104,10 +106,28 @@ def check_players(config: DuelConfig, spoofers: Sequence[Any], defenders: Sequen
         ValueError: a player that is unknown or does not fit.
         FileNotFoundError: a folder that holds no policy.
     """
+    _check_names(config, spoofers, defenders)
     for spoofer in spoofers:
         DuelGame(config, 1, spoofer=spoofer)
     for defender in defenders:
         DuelGame(config, 1, defender=defender)
+
+
+def _check_names(config: DuelConfig, spoofers: Sequence[Any], defenders: Sequence[Any]) -> None:
+    """Refuse unknown players at once: a game needs the thresholds of its detectors, which may take minutes.
+
+    Raises:
+        ValueError, FileNotFoundError: as `check_players`.
+    """
+    scenario = make_scenario(config.scenario, config.coupling)
+    for spoofer in spoofers:
+        with validation.argument(OWNER, "spoofer"):
+            spoofer_pool(spoofer, config.clean)
+    for defender in defenders:
+        with validation.argument(OWNER, "defender"):
+            for part in parts_of(defender) if isinstance(defender, str) else [defender]:
+                pair = watcher_and_response(part) if isinstance(part, str) else None
+                make_defender(part if pair is None else pair[1], scenario, ())
 
 
 def _name(given: Any, found: str) -> str:

@@ -47,7 +47,7 @@ class BestResponse:
 
         Raises:
             KeyboardInterrupt: Ctrl-C; the run can go on.
-            ValueError: the folder holds another run.
+            ValueError: the folder holds another run, naming the first setting that differs.
         """
         run, kept, train = self._spoofer(opponent, folder, seed) if side == SPOOFER else self._defender(
             opponent, folder, seed
@@ -55,8 +55,8 @@ class BestResponse:
         torch.set_num_threads(self.duel.threads)
         if not kept.holds_run:
             kept.begin(run)
-        elif kept.run() != run:
-            raise ValueError(f"{folder} holds another training than that of this league")
+        else:
+            _check_same(folder, kept.run(), run)
         state = kept.state()
         if (state is None or not kept.finished(run, state)) and train(run, kept, self._terminal()).train():
             raise KeyboardInterrupt
@@ -75,3 +75,23 @@ class BestResponse:
         config = DuelDefenderConfig(**vars(self.duel), spoofer=opponent)
         kept = RunFolder(folder, "spoofgym.learning.defender", (DuelDefenderConfig,), defender_ppo.Settings)
         return Run(config, self.defender_settings, seed, self.defender_steps), kept, defender.Training
+
+
+def _check_same(folder: Path, found: Run, asked: Run) -> None:
+    """Refuse to go on with another training; how many threads compute it does not matter.
+
+    Raises:
+        ValueError: naming the first setting that differs.
+    """
+    wanted = _flat(asked)
+    for name, value in _flat(found).items():
+        if name != "environment.threads" and value != wanted.get(name):
+            told = f"its {name} is {value!r}, not {wanted.get(name)!r}"
+            raise ValueError(f"{folder} holds another training than what is asked for: {told}")
+
+
+def _flat(run: Run) -> dict[str, Any]:
+    result: dict[str, Any] = {"steps": run.steps, "seed": run.seed}
+    for section in ("environment", "learner"):
+        result |= {f"{section}.{name}": value for name, value in run.content()[section].items()}
+    return result

@@ -51,7 +51,7 @@ OPTIONS = {
         *("scenario", "detector", "detectors", "knowledge", "action", "frames", "shadow", "fidelity"),
         *("defender", "payoff", "clean"),
     ),
-    "defender": ("scenario", "attacks", "detectors", "fidelity", "spoofer", "payoff"),
+    "defender": ("scenario", "attacks", "detectors", "bank", "fidelity", "spoofer", "payoff"),
 }
 """Arguments of an environment that are options of the program that trains on it."""
 

@@ -109,7 +109,16 @@ def league_figure(report: dict[str, Any], path: Path) -> None:
     else:
         upper = figure.subplots()
     _draw_matrix(upper, report)
+    figure.suptitle(_title(report), x=0.01, ha="left", fontsize=11)
     files.write_figure(path, figure)
+
+
+def _title(report: dict[str, Any]) -> str:
+    """Two lines, which fit beside a matrix of one column."""
+    last = report["results"][-1]
+    low, high = last["value_ci95"]
+    value = f"value {last['value']:.3g} [{low:.3g}, {high:.3g}]"
+    return f"{report['duel']['scenario']}: mean harm{_unit(report)}\nshare in the mixture in brackets; {value}"
 
 
 def _draw_matrix(axes: Any, report: dict[str, Any]) -> None:
@@ -125,10 +134,6 @@ def _draw_matrix(axes: Any, report: dict[str, Any]) -> None:
     labels = [[_label(name, share) for name, share in zip(*pair, strict=True)] for pair in named]
     axes.set_xticks(range(mean.shape[1]), labels[0], rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
     axes.set_yticks(range(mean.shape[0]), labels[1], fontsize=8)
-    low, high = last["value_ci95"]
-    value = f"value {last['value']:.3g} [{low:.3g}, {high:.3g}]"
-    title = f"{report['duel']['scenario']}: mean harm{_unit(report)}, share in the mixture in brackets; {value}"
-    axes.set_title(title, loc="left", fontsize=11)
 
 
 def _draw_values(axes: Any, results: list[dict[str, Any]], unit: str) -> None:

@@ -1,5 +1,6 @@
 """Cells of a payoff matrix: what a duel is worth, whoever sits where, and whatever the batches."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from spoofgym.envs.duel_config import DuelConfig
 from spoofgym.envs.duel_game import DuelGame
 from spoofgym.evaluation import duels
-from spoofgym.evaluation.duels import harms, play_cell, play_matrix, with_detectors_of
+from spoofgym.evaluation.duels import check_players, harms, play_cell, play_matrix, with_detectors_of
 from spoofgym.streams import RunStreams
 
 CONFIG = DuelConfig(scenario="foi-drive:horizon=30", detectors=("snapshot",))
@@ -66,6 +67,26 @@ def test_a_filter_that_diverges_is_counted_once() -> None:
     cell = play_cell(config, "jump:6000000", "always-use", 2, 3)
     assert (cell.harm <= 200.0).all()
     assert (cell.harm > 150.0).all()
+
+
+@pytest.mark.parametrize(
+    ("side", "player", "message"),
+    [
+        ("spoofer", "unsen:4", "duel: spoofer: unknown attack 'unsen': did you mean 'unseen'?"),
+        ("spoofer", "policy:nobody", "duel: spoofer: 'nobody' is no run folder"),
+        ("defender", "snapshot > nothing", "duel: defender: unknown response 'nothing'"),
+        ("defender", "policy:nobody", "duel: defender: 'nobody' is no run folder"),
+        ("defender", "pool:always-use+policy:nobody", "duel: defender: 'nobody' is no run folder"),
+    ],
+)
+def test_unknown_players_are_refused_before_thresholds_are_calibrated(
+    side: str, player: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spoofgym.envs.duel_game.calibrated_for_play", pytest.fail)
+    config = DuelConfig(scenario="foi-drive:horizon=22", detectors=("snapshot", "windowed:n=7"))
+    players = ((player,), ()) if side == "spoofer" else ((), (player,))
+    with pytest.raises(ValueError, match=re.escape(message)):
+        check_players(config, *players)
 
 
 def test_bad_input() -> None:

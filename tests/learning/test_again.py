@@ -29,6 +29,15 @@ from spoofgym.studies.export import recipe_of
                 9000,
             ),
         ),
+        (
+            defender,
+            Run(
+                DefenderConfig(detectors=("snapshot",), bank="multiple-hypothesis:hidden=0"),
+                defender_ppo.Settings(),
+                0,
+                9000,
+            ),
+        ),
     ],
 )
 def test_the_options_of_a_recipe_are_the_run(module, run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -250,3 +250,16 @@ def test_tables_and_the_figure_tell_who_is_exploited(whole: np.ndarray, tmp_path
         league_figure({**report, "results": results}, tmp_path / "league.png")
         heights.append(imread(tmp_path / "league.png").shape[0])
     assert heights[0] > heights[1] > 200  # a single round has no course of the value to draw
+
+
+def test_the_title_fits_above_a_matrix_of_few_players(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = {"mean": [[9.9]], "half_width": [[0.1]], "value": 9.9, "value_ci95": [9.1, 10.7], "gains": {}}
+    mixed = {"spoofer_mixture": [1.0], "defender_mixture": [1.0], "spoofers": ["ramp:1"], "defenders": ["always-use"]}
+    duel = {"scenario": "liu-flight:horizon=250,imu=tactical", "payoff": "error"}
+    drawn: list[Any] = []
+    monkeypatch.setattr("spoofgym.files.write_figure", lambda path, figure: drawn.append(figure))
+    league_figure({"duel": duel, "results": [{"number": 0, **cell, **mixed}]}, tmp_path / "league.png")
+    figure = drawn[0]
+    figure.canvas.draw()
+    assert figure.bbox.x1 >= max(text.get_window_extent().x1 for text in figure.texts)
+    assert "liu-flight:horizon=250,imu=tactical" in figure.texts[0].get_text()

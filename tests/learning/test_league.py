@@ -1,6 +1,7 @@
 """The program that plays a league, with real trainings."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -54,8 +55,13 @@ def test_a_run_of_another_training_is_refused(tmp_path: Path) -> None:
     settings = (ppo.Settings(lanes=4, trials=1), defender_ppo.Settings(lanes=4, imitate=False, validation_episodes=10))
     train = BestResponse(duel, False, 200, 200, *settings)
     assert train("spoofer", "always-use", tmp_path / "x", 1) == f"policy:{tmp_path / 'x'}"
-    with pytest.raises(ValueError, match="holds another training than that of this league"):
+    another = "holds another training than what is asked for: its environment.defender is 'always-use', not 'alw"
+    with pytest.raises(ValueError, match=another):
         train("spoofer", "always-exclude", tmp_path / "x", 1)
+    with pytest.raises(ValueError, match="its steps is 200, not 300"):
+        replace(train, spoofer_steps=300)("spoofer", "always-use", tmp_path / "x", 1)
+    more_threads = replace(train, duel=replace(duel, threads=2))
+    assert more_threads("spoofer", "always-use", tmp_path / "x", 1) == f"policy:{tmp_path / 'x'}"
 
 
 @pytest.mark.parametrize(
