@@ -21,6 +21,8 @@ from spoofgym.validation import nearest, shown
 Part = TypeVar("Part")
 
 KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+WORDS = {int: "a whole number", float: "a number"}
+"""What a value must be, in words."""
 
 
 @dataclass(frozen=True)
@@ -198,5 +200,5 @@ def _convert(text: str, key: str, value: str, annotation: Any) -> Any:
                 continue
     if str in choices:
         return value
-    wanted = " or ".join(choice.__name__ for choice in choices if choice is not type(None))
+    wanted = " or ".join(WORDS.get(choice, choice.__name__) for choice in choices if choice is not type(None))
     raise ValueError(f"{shown(text)}: {key} must be {wanted}, got {shown(value)}")

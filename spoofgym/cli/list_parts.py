@@ -34,6 +34,8 @@ POLICIES = "policies"
 KINDS = (*REGISTRIES, POLICIES)
 WIDEST = 88
 """Columns of running text."""
+LEAST_TOLD = 16
+"""Columns of what is told beside a name, however narrow the terminal."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -45,7 +47,7 @@ def parser() -> argparse.ArgumentParser:
         examples=EXAMPLES,
     )
     add = result.add_argument
-    add("kind", nargs="?", choices=KINDS, metavar="KIND", help=f"one of {', '.join(KINDS)} (default: the names of all)")
+    add("kind", nargs="?", type=_kind, choices=KINDS, metavar="KIND", help=f"one of {', '.join(KINDS)} (default: all)")
     add("name", nargs="?", metavar="NAME", help="of one of them")
     add_import(result)
     add_json(result)
@@ -64,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     elif options.name is None:
         found = _all(options.kind)
         content = [row for row, _ in found]
-        lines = _table([told for _, told in found], terminal.is_terminal)
+        lines = table([told for _, told in found], terminal.is_terminal)
     else:
         content, lines = _one(options.kind, options.name)
     do_all(
@@ -80,6 +82,15 @@ def _names(names: dict[str, list[str]]) -> Iterator[str]:
         yield from _folded(", ".join(listed), 2)
         yield ""
     yield from _folded("spoofgym list KIND tells each in a line, spoofgym list KIND NAME all of one.", 0)
+
+
+def _kind(given: str) -> str:
+    """What is given as a kind, if it is not the name of a part, which has its kind before it."""
+    name = given.partition(":")[0]
+    for kind in KINDS:
+        if name in (REGISTRIES[kind] if kind in REGISTRIES else published_names()):
+            raise argparse.ArgumentTypeError(f"{given!r} is a name, not a kind: spoofgym list {kind} {name}")
+    return given
 
 
 def _all(kind: str) -> list[tuple[dict[str, Any], tuple[str, str]]]:
@@ -108,13 +119,12 @@ def _about(card: Card) -> str:
     return f"a {card.role} on {scenario}: {score.metric} {score.value:.3g} {score.unit} against {score.opponent}"
 
 
-def _table(rows: Sequence[tuple[str, str]], terminal: bool) -> Iterator[str]:
-    """A line for each, cut where a terminal is narrower; whole where the output is no terminal."""
+def table(rows: Sequence[tuple[str, str]], terminal: bool) -> Iterator[str]:
+    """A line for each, cut after a word where a terminal is narrower; whole where the output is no terminal."""
     width = max(len(name) for name, _ in rows) if rows else 0
+    left = max(get_terminal_size().columns - width - 2, LEAST_TOLD)
     for name, told in rows:
-        line = f"{name:<{width}}  {told}"
-        columns = get_terminal_size().columns
-        yield line if not terminal or len(line) <= columns else f"{line[: columns - 4].rstrip()} ..."
+        yield f"{name:<{width}}  {textwrap.shorten(told, left, placeholder=' ...') if terminal else told}"
 
 
 def _part(found: Part) -> Iterator[str]:

@@ -20,6 +20,7 @@ from spoofgym.program import USAGE, program, say
 from spoofgym.validation import nearest
 
 NAME = "spoofgym"
+VERSION = "--version"
 HELP = ("-h", "--help", "help")
 EXAMPLES = (
     "spoofgym list attacks",
@@ -49,12 +50,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if first in ("", *HELP):
         print(overview())
         return 0
-    if first == "--version":
+    if first == VERSION:
         print(f"{NAME} {spoofgym.__version__}")
         return 0
     group = groups().get(first)
     if group is None:
-        return _refuse(first, [command.words.split()[0] for command in COMMANDS], NAME)
+        return _refuse(first, [*(command.words.split()[0] for command in COMMANDS), VERSION], NAME)
     if len(given) > 1 and given[1] in HELP:
         print(overview_of(first, group))
         return 0
@@ -77,7 +78,7 @@ def overview() -> str:
     lines = [f"usage: {NAME} COMMAND [OPTIONS]", "", *_folded("GNSS spoofing as a game on a real INS/GNSS filter.", 0)]
     for title, commands in SECTIONS.items():
         lines += ["", f"{title}:", *(line for words, told in _listed(commands) for line in _row(words, told, WIDTH))]
-    lines += ["", "options:", *_row("--version", "the version", WIDTH)]
+    lines += ["", "options:", *_row(VERSION, "the version", WIDTH)]
     lines += _row("COMMAND --help", "options of a command, with examples", WIDTH)
     return "\n".join([*lines, "", "examples:", *(f"  {line}" for line in EXAMPLES)])
 

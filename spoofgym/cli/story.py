@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -28,6 +29,8 @@ MOST_EVENTS = 14
 LABEL = 22
 """Columns of what stands before a sparkline."""
 LEAST_SPARKS = 10
+SEAT = 10
+"""Columns of what stands before a player."""
 
 
 def story(game: GameTrace, columns: int, blocks: bool = True) -> Iterator[str]:
@@ -38,13 +41,22 @@ def story(game: GameTrace, columns: int, blocks: bool = True) -> Iterator[str]:
         columns: of the terminal.
         blocks: whether it can print block characters.
     """
-    yield from _who(game)
+    yield from _folded(_who(game), columns, SEAT)
     yield ""
     yield from _events(game)
     yield ""
     yield from _sparklines(game, columns, BARS if blocks else PLAIN_BARS)
     yield ""
-    yield from _ending(game)
+    yield from _folded(_ending(game), columns, 0)
+
+
+def _folded(lines: Iterable[str], columns: int, label: int) -> Iterator[str]:
+    """Lines folded after words; the label before them stays with the first word, and paths stay whole."""
+    for line in lines:
+        yield from textwrap.wrap(
+            line[label:], columns, initial_indent=line[:label], subsequent_indent=" " * SEAT, break_long_words=False,
+            break_on_hyphens=False,
+        )
 
 
 def _who(game: GameTrace) -> Iterator[str]:

@@ -76,8 +76,12 @@ def lines(report: dict[str, Any]) -> list[str]:
         nis = f"mean NIS {clean['mean_nis']:.3g}, {clean['nis_per_degree']:.3g} per degree of freedom"
         result += [clean["alignment"], f"{FILTER}: {clean['epochs']} epochs, {nis}"]
     errors, warned = (sum(row["severity"] == kind for row in report["findings"]) for kind in ("error", "warning"))
-    told = f"{errors} errors, {warned} warnings" if errors or warned else "nothing contradicts it"
+    told = f"{_count(errors, 'error')}, {_count(warned, 'warning')}" if errors or warned else "nothing contradicts it"
     return [*result, f"{report['log']}: {told}"]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def parser() -> argparse.ArgumentParser:

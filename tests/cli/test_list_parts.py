@@ -7,7 +7,7 @@ import pytest
 
 from spoofgym.attacks import ATTACKS
 from spoofgym.cli import play
-from spoofgym.cli.list_parts import KINDS, main
+from spoofgym.cli.list_parts import KINDS, main, table
 from spoofgym.cli.parts import REGISTRIES, parts
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
@@ -48,6 +48,13 @@ def test_text_fits_the_terminal(arguments, columns, monkeypatch, capsys):
     assert main(arguments) == 0
     lines = capsys.readouterr().out.partition("example:")[0].splitlines()
     assert max(map(len, lines)) <= int(columns)
+
+
+def test_a_line_that_a_terminal_cuts_ends_after_a_word(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    rows = [("ramp", "An offset that grows without a jump"), ("a-much-longer", "Short")]
+    assert list(table(rows, terminal=True)) == ["ramp           An offset that grows ...", "a-much-longer  Short"]
+    assert next(table(rows, terminal=False)).endswith("without a jump")
 
 
 def test_a_specification_tells_of_its_part(capsys):

@@ -62,6 +62,9 @@ def test_a_group_lists_its_commands(first, capsys):
     [
         (["evalute"], "error: spoofgym: no command 'evalute': did you mean 'evaluate'? there are: "),
         (["evaluate", "spofers"], "error: spoofgym evaluate: no command 'spofers': did you mean 'spoofers'? there are"),
+        (["--verson"], "error: spoofgym: no command '--verson': did you mean '--version'? there are: "),
+        (["list", "detecters"], "error: argument KIND: invalid choice: 'detecters': did you mean 'detectors'?"),
+        (["list", "foi-drive"], "error: argument KIND: 'foi-drive' is a name, not a kind: spoofgym list scenarios foi"),
         (["study"], "error: spoofgym study needs one more word: acna, "),
         (["xyz"], "error: spoofgym: no command 'xyz'; there are: "),
         (["tune", "--scenari0", "x"], "error: unrecognized arguments: --scenari0 x: did you mean '--scenario'?"),

@@ -40,6 +40,13 @@ def test_figures_fit_the_terminal(game, columns):
             assert len(line) <= columns
 
 
+@pytest.mark.parametrize("columns", [80, 40])
+def test_who_plays_and_how_it_ends_fit_the_terminal(game, columns):
+    lines = list(story(game, columns))
+    ending = next(place for place, line in enumerate(lines) if line.startswith("horizontal error:"))
+    assert max(map(len, [*lines[: lines.index("")], *lines[ending:]])) <= columns
+
+
 def test_a_terminal_without_blocks_gets_others(game):
     assert "\n".join(story(game, 80, blocks=False)).isascii()
 

@@ -39,7 +39,7 @@ def test_an_error_is_the_status(tmp_path: Path, capsys: pytest.CaptureFixture[st
     (row,) = json.loads(said.out)["findings"]
     assert (row["severity"], row["file"], row["line"]) == ("error", "imu.csv", 1)
     assert row["advice"] == "divide gx_radps, gy_radps and gz_radps by 57.29578"
-    assert f"{folder}: 1 errors, 0 warnings" in said.err
+    assert f"{folder}: 1 error, 0 warnings" in said.err
 
 
 @pytest.mark.parametrize("name", FILTERED)
