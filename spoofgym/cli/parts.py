@@ -49,6 +49,7 @@ PLACES = ("foi-drive", "liu-flight", "kujur-flight", "song-robot")
 UNITS = r"m/s²|m/s|m²|deg/h|deg/s|degrees|deg|rad|µg|Hz|m|s|epochs|fixes|standard deviations"
 UNIT = re.compile(rf"(?:^|, )({UNITS})(?=[,;:.]|$)|^(epochs)\b")
 """Where a description names the unit of its value: "radius of the circle, m; ..."."""
+UNTOLD = "It has no docstring that would tell what it is"
 YEAR = r"\(?(?:19|20)\d\d\)?"
 WHERE = r"(?:,? (?:eqs?|sections?|chapters?|tables?|appendix) [\w.]+(?:(?:, | and | to )[\d.]+)*)*"
 CITED = re.compile(
@@ -99,7 +100,11 @@ class Part:
 
     @property
     def command(self) -> str:
-        """A command that plays it."""
+        """A command that plays it; of one's own part it names the module to import."""
+        own = "" if self.module.split(".")[0] == "spoofgym" else f" --import {self.module}"
+        return self._played() + own
+
+    def _played(self) -> str:
         if self.kind == "scenarios":
             return f"spoofgym play --scenario {self.example}"
         try:
@@ -134,16 +139,21 @@ def part(kind: str, name: str) -> Part:
         raise ValueError(unknown_name(kind[:-1], name, registry))
     factory = registry[name]
     module = factory.__module__ if hasattr(factory, "__module__") else ""
-    paragraphs, _ = _read(inspect.getdoc(factory) or "")
+    paragraphs, _ = _read(_doc(factory))
     above, _ = _read(inspect.getdoc(sys.modules.get(module)) or "")
     if kind == "scenarios" or not paragraphs:  # a scenario's module says what is flown, its function how it is a game
         paragraphs = above[:1] + paragraphs
-    told, *rest = re.split(r"(?<!al)\. ", paragraphs[0] if paragraphs else "", maxsplit=1)
+    told, *rest = re.split(r"(?<!al)\. ", paragraphs[0] if paragraphs else UNTOLD, maxsplit=1)
     text = tuple(paragraph for paragraph in (*rest, *paragraphs[1:]) if paragraph)
     return Part(
         kind, name, told.rstrip("."), text, _options(factory), _source([*paragraphs, *above]),
         GIVEN.get(name, name), module,
     )
+
+
+def _doc(factory: Callable[..., Any]) -> str:
+    """The factory's own docstring: a class would otherwise tell what its base class is."""
+    return inspect.cleandoc(factory.__doc__ or "")
 
 
 def parts(kind: str) -> list[Part]:

@@ -156,7 +156,7 @@ def _letter(game: GameTrace, place: np.ndarray | Sequence[int]) -> str:
 def _ending(game: GameTrace) -> Iterator[str]:
     worst = int(game.error.argmax())
     yield (
-        f"horizontal error: {game.error.mean():.2f} m on average, {game.error[worst]:.2f} m at most (at "
+        f"horizontal error: mean {game.error.mean():.2f} m, at most {game.error[worst]:.2f} m (at "
         f"{game.time[worst]:.6g} s), {game.error[-1]:.2f} m at the end"
     )
     left_out, taken = int(np.count_nonzero(~game.used)), int(game.backtracked.sum())

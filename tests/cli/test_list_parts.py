@@ -88,16 +88,23 @@ def test_parts_of_ones_own_are_listed(tmp_path, monkeypatch, capsys):
         "class Mine(Snapshot):\n"
         "    '''A test of my own. It is like the other.'''\n"
         "DETECTORS['mine'] = Mine\n"
+        "class Untold(Snapshot): pass\n"
+        "DETECTORS['untold'] = Untold\n"
         "from spoofgym.attacks import ATTACKS\n"
         "ATTACKS['my-ramp'] = ATTACKS['ramp']\n"
     )
     try:
         assert main(["detectors", "mine", "--import", "parts_of_a_test"]) == 0
-        assert "A test of my own." in capsys.readouterr().out
+        text = capsys.readouterr().out
+        assert "A test of my own." in text
+        assert text.endswith("--detector mine --import parts_of_a_test\n")
+        assert main(["detectors", "untold"]) == 0
+        assert "\n\nIt has no docstring that would tell what it is.\n\n" in capsys.readouterr().out
         assert main(["attacks"]) == 0
         assert "my-ramp" in capsys.readouterr().out
     finally:
-        del REGISTRIES["detectors"]["mine"]
+        for name in ("mine", "untold"):
+            REGISTRIES["detectors"].pop(name, None)
         ATTACKS.pop("my-ramp", None)
     with pytest.raises(SystemExit) as ended:
         main(["detectors", "--import", "no_such_module"])

@@ -29,7 +29,7 @@ def test_the_story_tells_what_happened_and_when(game):
     assert float(alarm.split()[0]) == pytest.approx(game.time[first.epoch])
     assert float(alarm.split()[1]) == pytest.approx(game.error[first.epoch], abs=0.006)
     assert f"{back.detail} taken back" in text
-    assert f"{game.error.mean():.2f} m on average" in text
+    assert f"mean {game.error.mean():.2f} m" in text
     assert lines[-1] == "the spoofer is detected"
 
 
