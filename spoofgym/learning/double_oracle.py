@@ -186,6 +186,8 @@ class League:
                 player is unknown or does not fit.
         """
         files.check_folder(folder)
+        if settings.rounds and any(letter in str(folder) for letter in "+,"):
+            raise ValueError(f"{folder}: '+' and ',' separate the players of a mixture: choose a folder without them")
         self.settings, self.folder, self._train = settings, folder, train
         self._engine: Engine = Here() if engine is None else engine
         path = folder / SETTINGS_FILE

@@ -263,3 +263,9 @@ def test_the_title_fits_above_a_matrix_of_few_players(tmp_path: Path, monkeypatc
     figure.canvas.draw()
     assert figure.bbox.x1 >= max(text.get_window_extent().x1 for text in figure.texts)
     assert "liu-flight:horizon=250,imu=tactical" in figure.texts[0].get_text()
+
+
+@pytest.mark.parametrize("name", ["a+b", "a,b"])
+def test_a_folder_that_no_mixture_can_name_is_refused_before_anybody_trains(name: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="separate the players of a mixture"):
+        League(SETTINGS, tmp_path / name, pytest.fail)
