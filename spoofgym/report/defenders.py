@@ -53,8 +53,15 @@ def _pooled(row: Report) -> bool:
     return str(row["attack"]).startswith(POOLED)
 
 
-def _bars(report: Report, rows: list[Report], attacks: str, marks: list[Mark]) -> Bars:
+def _least(rows: list[Report]) -> str:
+    """Whose mean error is the least, in a sentence."""
     best = rows[0]
+    if len(rows) == 1:
+        return f"The mean error of {best['defender']} is {best['mean_error_m']:.2f} m."
+    return f"{best['defender']} has the least mean error, {best['mean_error_m']:.2f} m, of {len(rows)} defenders."
+
+
+def _bars(report: Report, rows: list[Report], attacks: str, marks: list[Mark]) -> Bars:
     bars = []
     for row in rows:
         low, high = interval_of(row, "ci95_m")
@@ -63,8 +70,8 @@ def _bars(report: Report, rows: list[Report], attacks: str, marks: list[Mark]) -
     bound = "".join(f" The Bayesian bound is {mark.value:.2f} m." for mark in marks)
     return Bars(
         title=f"Mean error, {attacks}",
-        summary=f"{best['defender']} has the least mean error, {best['mean_error_m']:.2f} m, of {len(rows)} defenders."
-        f"{bound} The axis is logarithmic; “clean out” is the share of clean fixes that are excluded.",
+        summary=f"{_least(rows)}{bound} The axis is logarithmic; “clean out” is the share of clean fixes that are "
+        "excluded.",
         unit="mean horizontal error of the real-time output, m (95 % interval)",
         bars=bars,
         marks=marks,

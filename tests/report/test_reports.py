@@ -57,6 +57,13 @@ def test_defenders_are_sorted_and_their_differences_shown():
     assert "better than 4 of 4" in pairs.summary
 
 
+def test_a_defender_alone_is_not_compared():
+    report = reports.defenders()
+    alone = {**report, "rows": report["rows"][:1], "comparisons": [], "gaps": []}
+    assert "has the least mean error" in figure(report, Bars).summary
+    assert figure(alone, Bars).summary.startswith(f"The mean error of {report['rows'][0]['defender']} is ")
+
+
 def test_the_matrix_has_its_shares_intervals_and_curves():
     report = reports.matrix()
     matrix, row = figure(report, Matrix), report["rows"][1]
