@@ -28,7 +28,7 @@ def test_a_page_that_help_shows_is_about_the_environment(page):
 def test_it_is_short_and_names_the_commands():
     text = README.read_text(encoding="utf-8")
     assert len(text.splitlines()) < 150
-    for command in ("python -m train.spoofer --scenario", "spoofgym evaluate spoofers --scenario", "make test"):
+    for command in ("spoofgym train spoofer --scenario", "spoofgym evaluate spoofers --scenario", "make test"):
         assert command in text
 
 

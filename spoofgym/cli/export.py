@@ -82,7 +82,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from spoofgym.learning.from_zip import policy_of_zip
 
     policy_of_zip(source, config, out)
-    console().print(f"policy in {out}, arrays and text only; use it as policy:{out}", soft_wrap=True)
+    terminal = console()
+    if options.scenario is None:  # a zip does not say what it was trained on
+        terminal.print(
+            f"taken as trained on {options.environment or SPOOFER} with scenario={config.scenario}: "
+            "name the --scenario if it was another",
+            soft_wrap=True,
+        )
+    terminal.print(f"policy in {out}, arrays and text only; use it as policy:{out}", soft_wrap=True)
     return 0
 
 

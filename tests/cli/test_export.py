@@ -67,6 +67,14 @@ def test_a_zip_plays_as_its_model(name, tmp_path, capsys):
     assert "exists already" in capsys.readouterr().err
 
 
+def test_what_a_zip_does_not_say_is_told(tmp_path, capsys):
+    environment = gym.make("spoofgym/Spoofer-v0")
+    PPO("MlpPolicy", environment, n_steps=8, batch_size=8, seed=3, device="cpu").save(tmp_path / "mine.zip")
+    assert main([str(tmp_path / "mine.zip"), str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out.replace("\n", " ")
+    assert "taken as trained on Spoofer-v0 with scenario=liu-flight: name the --scenario if it was another" in told
+
+
 def rewritten(source, target, **parts):
     """A copy of a zip with other parts in it."""
     with zipfile.ZipFile(source) as read, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as write:
