@@ -142,7 +142,7 @@ def test_the_name_builds_the_same_attack(specification):
         ("partial", "needs 'attack'"),
         ("partial:drift", "unknown attack 'drift'"),
         ("partial:ramp:1,satellites=0", "partial: satellites must be a whole number, 1 or more, got 0"),
-        ("partial:ramp:1,satellites=1.5", "satellites must be int, got '1.5'"),
+        ("partial:ramp:1,satellites=1.5", "satellites must be a whole number, got '1.5'"),
         ("partial:ramp:1,numbers=3+3", r"partial: numbers must be those of satellites, each once.*got '3\+3'"),
         ("partial:ramp:1,numbers=G07", "partial: numbers must be those of satellites, each once.*got 'G07'"),
         ("partial:ramp:1,satellites=2,numbers=3", "at most one of satellites, numbers"),

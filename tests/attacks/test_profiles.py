@@ -242,7 +242,7 @@ def test_make_attack_takes_objects():
         ("ramp", "needs 'rate'"),
         ("ramp:-0.5", "rate must be a finite number, 0 or more, got -0.5"),
         ("ramp:nan", "rate must be a finite number, 0 or more, got nan"),
-        ("ramp:fast", "rate must be float, got 'fast'"),
+        ("ramp:fast", "rate must be a number, got 'fast'"),
         ("ramp:1,direction=inf", "direction must be a finite number, got inf"),
         ("ramp:1,onset=nan", "onset must be a finite number, got nan"),
         ("ramp:1,jump=2", "no option 'jump'; valid options: rate, direction, onset"),

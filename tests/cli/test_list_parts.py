@@ -5,6 +5,7 @@ import shlex
 
 import pytest
 
+from spoofgym import own_parts
 from spoofgym.attacks import ATTACKS
 from spoofgym.cli import play
 from spoofgym.cli.list_parts import KINDS, main, table
@@ -82,6 +83,7 @@ def test_a_run_folder_without_a_card_is_no_published_policy(tmp_path, capsys):
 
 def test_parts_of_ones_own_are_listed(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(own_parts, "_TAKEN", [])
     (tmp_path / "parts_of_a_test.py").write_text(
         "from spoofgym.detectors import DETECTORS\n"
         "from spoofgym.detectors.chi_square import Snapshot\n"

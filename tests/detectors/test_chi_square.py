@@ -195,7 +195,7 @@ def test_make_detector_takes_objects():
         ("snapshot:preset=song", "preset must be one of shadmehri, got 'song'"),
         ("snapshot:25.9,p_fa=1e-5", "at most one of threshold, p_fa, preset, arl0; got threshold and p_fa"),
         ("windowed:0", "n must be a whole number, 1 or more, got 0"),
-        ("windowed:2.5", "n must be int, got '2.5'"),
+        ("windowed:2.5", "n must be a whole number, got '2.5'"),
         ("windowed:n=5,p_fa=1e-3,arl0=100", "at most one of threshold, p_fa, preset, arl0; got p_fa and arl0"),
         ("windowed:threshold=-1", "threshold must be a finite number greater than 0, got -1.0"),
         ("windowed:arl0=0.5", "arl0 must be a finite number greater than 1, got 0.5"),

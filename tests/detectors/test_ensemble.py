@@ -237,7 +237,7 @@ def test_it_has_the_memory_and_the_demands_of_its_members():
         ("ensemble:snapshot", r"members must be two or more detectors, all different, got \['snapshot:arl0=100000'\]"),
         ("ensemble:snapshot+snapshot", "members must be two or more detectors, all different"),
         ("ensemble:snapshot+other", "unknown detector 'other'"),
-        ("ensemble:snapshot+windowed:n=x", "members: 'windowed:n=x': .*n must be int, .*'/' stands for ',' and '~'"),
+        ("ensemble:snapshot+windowed:n=x", "members: 'windowed:n=x': .*n must be a whole .*'/' stands for ',' and '~'"),
         ("ensemble:snapshot+window-bank:lengths=5+20", "ensemble: members: '20': unknown detector '20'.*'~' for"),
         ("ensemble:snapshot+windowed:m=5", "has no option 'm'; valid options: "),
         ("ensemble:snapshot+windowed,threshold=0", "threshold must be a finite number greater than 0, got 0"),

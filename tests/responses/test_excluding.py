@@ -339,7 +339,7 @@ def test_a_threshold_is_set_in_a_copy():
         ("exclude:reuse_threshold=4", "exclude: reuse_threshold needs reuse"),
         ("exclude:reuse=2,reuse_threshold=0", "reuse_threshold must be a finite number greater than 0, got 0"),
         ("exclude-and-backtrack:0", "n must be a whole number, 1 or more, got 0"),
-        ("exclude-and-backtrack:2.5", "n must be int"),
+        ("exclude-and-backtrack:2.5", "n must be a whole number"),
         ("constant-velocity-start:20,longest=19", "longest must be a whole number, 20 or more, got 19"),
         ("constant-velocity-start:hold=0", "hold must be a finite number greater than 0"),
         ("constant-velocity-start:acceleration=-1", "acceleration must be a finite number greater than 0"),
