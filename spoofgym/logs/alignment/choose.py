@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from spoofgym import validation
@@ -51,7 +53,9 @@ def _first_that_fits(log: Log, least_speed: float | None) -> Alignment:
     if log.heading is not None:
         return without_motion(log, _first_fix(log), "heading")
     if has_table(log.folder, TABLE):
-        return by_own_attitude(log)
+        # an attitude of other axes, such as a phone's, or one that begins later is passed over
+        with suppress(ValueError):
+            return by_own_attitude(log)
     try:
         found = by_course(log, least_speed)
     except ValueError as error:
