@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.guidance import Guidance, Steering, make_guidance
 from spoofgym.immutable import Immutable
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.family import FilterFamily
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.tight.model import TightModel
+from spoofgym.specification import Specification
 from spoofgym.timeline import Timeline, manoeuvre_times
 from spoofgym.truth import Truth
 from spoofgym.validation import shown
 
 ALERT_LIMITS = (556.0, 50.0)
 """Horizontal and vertical, m: RNP 0.3, and the limit of an approach with vertical guidance (DO-229, LNAV/VNAV)."""
+LANE = 3.5
+"""Width of a lane of a road, m: the usual corridor of a vehicle that is steered across its direction of travel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,6 +40,7 @@ class Scenario(Immutable):
         history: epochs that the navigator keeps at least, where somebody can backtrack.
         clock_rate: the largest rate at which a spoofer pulls the clock of a receiver of ranges, m/s.
         alert_limits: horizontal and vertical position error from which the navigation is hazardous, m.
+        guidance: how the vehicle is steered by its own estimate; None = it keeps its path whatever it estimates.
     """
 
     family: FilterFamily
@@ -46,6 +52,7 @@ class Scenario(Immutable):
     history: int = 60
     clock_rate: float = 0.0
     alert_limits: tuple[float, float] = ALERT_LIMITS
+    guidance: Guidance | None = None
 
     def __post_init__(self) -> None:
         owner = f"scenario {self.name!r}"
@@ -63,7 +70,43 @@ class Scenario(Immutable):
     @property
     def name(self) -> str:
         """The specification that builds it."""
-        return self.truth.name
+        if self.guidance is None:
+            return self.truth.name
+        given = Specification.parse(self.truth.name)
+        return str(replace(given, options={**given.options, "guidance": self.guidance.nested}))
+
+    @cached_property
+    def unguided(self) -> Scenario:
+        """The same game of a vehicle that keeps its path: innovations, errors and thresholds are those of this one."""
+        return self if self.guidance is None else replace(self, guidance=None)
+
+    def guided(self, text: str | None, axes: str) -> Scenario:
+        """The game of a vehicle that is steered by its own estimate.
+
+        Args:
+            text: how, as `spoofgym.guidance.make_guidance` takes it; None = it is not.
+            axes: in which it is steered where the text does not say. The corridor is then `LANE` wide across the
+                direction of travel, and twice the horizontal alert limit in both horizontal axes.
+
+        Raises:
+            ValueError: a guidance that is unknown or not valid.
+        """
+        if text is None:
+            return self
+        owner, corridors = f"scenario {self.name!r}", {"lateral": LANE, "horizontal": 2.0 * self.alert_limits[0]}
+        with validation.argument(owner, "guidance"):
+            made = make_guidance(validation.text(owner, "guidance", text), axes, corridors)
+        return replace(self, guidance=made)
+
+    def steering(self, num_runs: int) -> Steering | None:
+        """That of so many vehicles; None where they keep their path.
+
+        Raises:
+            ValueError: the vehicle has no direction of travel, across which it could be steered.
+        """
+        if self.guidance is None:
+            return None
+        return Steering(self.guidance, self.timeline, self.velocity_in_steps(), num_runs)
 
     @property
     def timeline(self) -> Timeline:

@@ -41,6 +41,7 @@ class Simulation:
         alarm: whether any detector alarms in the present epoch, (N,).
         offset: what the spoofer added to the present fix, (N, 3), m ENU.
         decision: the response's, on the present epoch; to use every fix where there is none.
+        steering: how far the vehicles are from their paths; None = they are not steered by their estimates.
         used: whether the last `resolve` used the fix, (N,).
     """
 
@@ -123,6 +124,7 @@ class Simulation:
         self.clock_offset = np.zeros(num_runs)
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
+        self.steering = scenario.steering(num_runs)
         for player in (attack, response):
             if player is not None:
                 player.join(self)
@@ -178,6 +180,8 @@ class Simulation:
             detector.bind(len(runs), self._family.seen_dimension(detector.in_position))
         self.offset[runs], self.clock_offset[runs] = 0.0, 0.0
         self.used[runs] = False
+        if self.steering is not None:
+            self.steering.begin(runs)
         if self.attack is not None:
             self.attack.reset(runs, self.streams)
         if self.confounders is not None:
@@ -228,9 +232,7 @@ class Simulation:
         index = self.navigator.index[runs]
         innovation = self.navigator.innovate(self._noise[runs, index], runs)
         available = np.ones(len(runs), dtype=bool)
-        return Epoch(
-            index - self.burn_in, self._times[index], innovation, available=available, view=self._view(runs)
-        )
+        return Epoch(index - self.burn_in, self._times[index], innovation, available=available, view=self._view(runs))
 
     def _white_epochs(self, runs: Runs) -> list[Epoch]:
         """The epochs before epoch 0 that a matched filter's detectors remember: drawn directly."""
@@ -327,7 +329,11 @@ class Simulation:
         deviation = self._noise[self._all, following]
         deviation += self._family.spoofed(self.fidelity, following, self.burn_in, spoof)
         self.offset, self.clock_offset = spoof.offset, spoof.clock
+        if self.steering is not None:
+            self.steering.leave(self.error)
         navigator.propagate()
+        if self.steering is not None:
+            self.steering.arrive(clock.index, self.error)
         innovation = navigator.innovate(deviation)
         if not self._holds:
             self.require_converged()

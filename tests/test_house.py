@@ -12,7 +12,7 @@ import spoofgym
 
 PACKAGE = Path(spoofgym.__file__).parent
 ROOMS = (
-    *("geodesy", "mechanization", "timeline", "trajectory", "truth", "sensors", "navigation", "attacks"),
+    *("geodesy", "mechanization", "timeline", "trajectory", "truth", "guidance", "sensors", "navigation", "attacks"),
     *("detectors", "responses", "scenario", "clean_starts", "fitting", "simulation", "logs", "scenarios"),
     *("calibration", "optimum", "policies", "envs", "duel", "evaluation", "studies", "report", "learning"),
     *("cli", "__main__"),

@@ -103,7 +103,7 @@ def left_out(scenario: Scenario) -> list[str]:
 
 
 def _listed(scenario: Scenario) -> dict[str, Sequence[ClassicalDefender]]:
-    return {"published": PUBLISHED, "tuned": tuned_for(scenario.name)}
+    return {"published": PUBLISHED, "tuned": tuned_for(scenario.unguided.name)}
 
 
 def world_of(

@@ -112,7 +112,7 @@ def engine_of(options: argparse.Namespace) -> Engine:
 
 def classical_defenders(scenario: Scenario, payoff: Payoff) -> tuple[str, ...]:
     """Every classical defender that fits a scenario and a payoff, and the yardsticks, as they are spelled."""
-    listed = [*PUBLISHED, *tuned_for(scenario.name)]
+    listed = [*PUBLISHED, *tuned_for(scenario.unguided.name)]
     spelled = [f"{each.detector}{SEPARATOR}{each.response}" for each in listed if fits(each.detector, scenario)]
     weighing = [*WITHOUT_ALARM, *([keeps_within(payoff.limit)] if isinstance(payoff, Beyond) else [])]
     alone = [name for name in weighing if set(make_response(name).needs) <= set(scenario.offers)]

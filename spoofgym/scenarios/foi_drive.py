@@ -63,6 +63,7 @@ def foi_drive(
     receiver: str = "white",
     process_noise: float = 1.0,
     bias_states: bool = True,
+    guidance: str | None = None,
 ) -> Scenario:
     """The drive as a game from 20 s to 250 s.
 
@@ -80,6 +81,9 @@ def foi_drive(
         process_noise: factor on the variance of the filter's inertial process noise. The report does not give it, and
             it decides whether GNSS is ever used again after an attack.
         bias_states: whether the filter estimates the IMU's biases; the report's has nine states.
+        guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
+            with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
+            keeps its path whatever it estimates.
 
     Raises:
         ValueError: an unknown IMU or receiver, a factor that is not positive, or a game outside the drive.
@@ -129,4 +133,4 @@ def foi_drive(
         error_scale=10.0,
         defender_scale=10.0,
         depth_table=DEPTHS,
-    )
+    ).guided(guidance, "lateral")

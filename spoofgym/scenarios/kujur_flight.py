@@ -66,6 +66,7 @@ def kujur_flight(
     horizontal_alert_limit: float = ALERT_LIMITS[0],
     vertical_alert_limit: float = ALERT_LIMITS[1],
     drag_off_rate: float | None = None,
+    guidance: str | None = None,
 ) -> Scenario:
     """The flight as a game on a filter that has settled for 15 minutes.
 
@@ -81,6 +82,9 @@ def kujur_flight(
         vertical_alert_limit: m.
         drag_off_rate: largest rate of the spoofed position per axis, and of the spoofed clock, m/s; None = 0.25 where
             the filter takes ranges, 4 where it takes fixes.
+        guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
+            with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
+            keeps its path whatever it estimates.
 
     Raises:
         ValueError: an unknown coupling or IMU, or a number out of range.
@@ -117,7 +121,7 @@ def kujur_flight(
         onset=onset,
         horizon=horizon,
     )
-    return rules.scenario(FAMILIES[coupling](truth, hour, imu))
+    return rules.scenario(FAMILIES[coupling](truth, hour, imu)).guided(guidance, "horizontal")
 
 
 def _tight(truth: SimulatedTruth, hour: float, imu: str) -> TightFamily:

@@ -83,6 +83,7 @@ def liu_flight(
     drag_off_rate: float | None = None,
     horizontal_alert_limit: float = ALERT_LIMITS[0],
     vertical_alert_limit: float = ALERT_LIMITS[1],
+    guidance: str | None = None,
 ) -> Scenario:
     """The Liu flight: aviation-grade INS and a single-frequency GPS receiver.
 
@@ -108,6 +109,9 @@ def liu_flight(
             filter takes fixes, 0.25 where it takes ranges.
         horizontal_alert_limit: position error from which the navigation is hazardous, m.
         vertical_alert_limit: m.
+        guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
+            with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
+            keeps its path whatever it estimates.
 
     Raises:
         ValueError: an unknown name, a number out of range, a game outside the flight, or options that do not go
@@ -153,7 +157,7 @@ def liu_flight(
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
     truth = SimulatedTruth(name=name, trajectory=_trajectory(), rate=rate, onset=onset, horizon=horizon)
     fixes = _Fixes(sigma, markov_sigma, markov_time, noise)
-    return rules.scenario(FAMILIES[coupling](truth, imu, fixes))
+    return rules.scenario(FAMILIES[coupling](truth, imu, fixes)).guided(guidance, "horizontal")
 
 
 @dataclass(frozen=True)

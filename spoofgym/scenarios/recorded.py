@@ -58,6 +58,7 @@ def recorded(
     coupling: str = COUPLINGS[0],
     alignment: str | None = None,
     least_speed: float | None = None,
+    guidance: str | None = None,
 ) -> Scenario:
     """A log in the project's format as a game.
 
@@ -76,6 +77,9 @@ def recorded(
         alignment: how the filter starts (`spoofgym.logs.alignment`): ``auto``, ``static``, ``attitude``, ``course`` or
             ``coarse``; None = as ``log.toml`` says, else ``auto``.
         least_speed: whose course counts as heading, m/s; None = 5 m/s, or what the accuracy of the velocity allows.
+        guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
+            with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
+            keeps its path whatever it estimates.
 
     Raises:
         ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
@@ -125,7 +129,8 @@ def recorded(
     if coupling == "tight" or fixes == "ranges":
         check_ranges_of(path)
     family = FAMILIES[coupling](log, asked, **common)
-    return Scenario(family=family, drag_off_rate=DRAG_OFF_RATE, error_scale=10.0, clock_rate=DRAG_OFF_RATE[0])
+    made = Scenario(family=family, drag_off_rate=DRAG_OFF_RATE, error_scale=10.0, clock_rate=DRAG_OFF_RATE[0])
+    return made.guided(guidance, "lateral")
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,7 @@ def shadmehri_flight(
     onset: float | None = None,
     window: int | None = None,
     guard: str | None = None,
+    guidance: str | None = None,
 ) -> Scenario:
     """The flight as a game that ends at 30 s, with a filter of constant R and Q or one that tunes itself.
 
@@ -82,6 +83,9 @@ def shadmehri_flight(
             burn-in need a later one where the filter is not matched.
         window: w of the self-tuning filter, fixes; None = 50.
         guard: of its recursion, see `Adaptation`; None = as published.
+        guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
+            with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
+            keeps its path whatever it estimates.
 
     Raises:
         ValueError: an unknown filter, noise or guard, a window or a guard for the common filter, a number out of range,
@@ -131,4 +135,5 @@ def shadmehri_flight(
         true_position_random_walk=FilterTuning().position_random_walk,
         adaptation=Adaptation(window, guard) if filter == "self-tuning" else None,
     )
-    return Scenario(family=family, drag_off_rate=(5.0, 5.0, 5.0), error_scale=10.0, defender_scale=10.0)
+    made = Scenario(family=family, drag_off_rate=(5.0, 5.0, 5.0), error_scale=10.0, defender_scale=10.0)
+    return made.guided(guidance, "horizontal")

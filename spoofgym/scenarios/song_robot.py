@@ -134,6 +134,7 @@ def song_robot(
     credit: int = 5,
     horizon: int = 300,
     onset: float = 0.0,
+    guidance: str | None = None,
 ) -> Scenario:
     """The robot as a game from ``onset`` on; the paper's attacks begin at 150 s, or at 50 and 150 s.
 
@@ -151,6 +152,9 @@ def song_robot(
         credit: fixes used in a row, with ``credited``.
         horizon: epochs of the game.
         onset: time of epoch 0, s.
+        guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
+            with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
+            keeps its path whatever it estimates.
 
     Raises:
         ValueError: an unknown name, or a number out of range.
@@ -205,4 +209,4 @@ def song_robot(
     rates = (SPEED, SPEED, SPEED)
     return Scenario(
         family=family, drag_off_rate=rates, error_scale=5.0, defender_scale=1.0, harm_cap=20.0, depth_table=DEPTHS
-    )
+    ).guided(guidance, "lateral")

@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit status."""
     options = parser().parse_args(arguments)
     scenario = make_scenario(options.scenario)
-    tuned = [f"{each.detector}{SEPARATOR}{each.response}" for each in tuned_for(scenario.name)]
+    tuned = [f"{each.detector}{SEPARATOR}{each.response}" for each in tuned_for(scenario.unguided.name)]
     defenders = list(options.defender or [*tuned, *YARDSTICKS])
     detectors = tuple(options.detector or (name for name in WORLD_DETECTORS if fits(name, scenario)))
     duel = DuelConfig(scenario=options.scenario, detectors=detectors, clean=options.clean)

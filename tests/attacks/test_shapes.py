@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from spoofgym.attacks import make_attack
-from spoofgym.attacks.fusion_ripper import lateral
 from spoofgym.attacks.meaconing import path
 from spoofgym.navigation.interface import Clock
 from spoofgym.scenarios import make_scenario
 from spoofgym.streams import RunStreams
 from spoofgym.timeline import Timeline
+from spoofgym.travel import lateral
 
 TIMELINE = Timeline.steady(start=800.0, interval=1.0, num_epochs=120)
 NORTH = np.broadcast_to([0.0, 10.0, 0.0], (121, 3))
