@@ -49,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
     add("--spoofer", metavar="SPEC", help="opponent of DuelDefender-v0")
     add("--defender", metavar="SPEC", help="opponent of DuelSpoofer-v0")
     add("--payoff", metavar="SPEC", help="of the duel")
+    add("--objective", metavar="SPEC", help="of Spoofer-v0: what the spoofer was paid for")
     add("--clean", type=share, help="share of games without an attack")
     add("--bank", metavar="SPEC", help="bank of hypotheses that a defender saw")
     add("--fidelity", choices=FIDELITIES, help="of the simulation")
@@ -58,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
 
 OF_ZIP = (
     *("scenario", "detector", "knowledge", "action", "frames", "shadow", "attacks", "spoofer", "defender", "payoff"),
-    *("clean", "bank", "fidelity", "coupling"),
+    *("objective", "clean", "bank", "fidelity", "coupling"),
 )
 """Arguments of environments among the options, as they are called there, but for the detectors."""
 

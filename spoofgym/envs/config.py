@@ -185,6 +185,7 @@ class SpooferConfig:
     on_alarm: str = "end"
     response: str | Response | tuple[Weighted[Response], ...] = "exclude"
     forfeit: float = 1.0
+    objective: str = "error"
     tracking_sigma: float = 0.0
     tracking_time: float = 0.0
     frames: int = 1
@@ -199,6 +200,7 @@ class SpooferConfig:
         validation.one_of(owner, "action", self.action, ACTIONS)
         validation.one_of(owner, "on_alarm", self.on_alarm, ON_ALARM)
         validation.text(owner, "fidelity", self.fidelity)
+        validation.text(owner, "objective", self.objective)
         if self.action == "innovation" and self.knowledge == "blind":
             raise ValueError(
                 "action 'innovation' runs a shadow filter: knowledge must be 'shadow' or 'full', not 'blind'"

@@ -42,6 +42,10 @@ class DefenderEnv(SingleEnv):
     takes the ranges to the satellites instead of fixes, and the defender may leave out single satellites. With fewer
     than four the filter still uses what is left, and coasts in the directions that nothing observes.
 
+    With `guidance=` in the scenario (`foi-drive:guidance=first-order:2`) the vehicle is steered by its own estimate
+    and leaves its path by about minus the error (`docs/reference/guidance.md`). `info["deviation"]` tells how far.
+    Observations, rewards and errors are those of the game without it.
+
     ```python
     import gymnasium
 
@@ -218,6 +222,8 @@ class DefenderEnv(SingleEnv):
     - `satellites_left_out`: satellites in view that were left out of the last fix, if it was used (`coupling="tight"`
       only).
     - `satellites_ignored`: choices to leave out an empty slot (`coupling="tight"` only).
+    - `deviation`: distance of the vehicle from its path at the present epoch, m (with `guidance=` in the scenario only,
+      after a reset, too).
     - `mean_error`: mean of the error over the game, m (last step only). Where the filter diverged, its last error
       stands for the epochs that were left.
     - `outcome`: "finished", or "diverged" where the filter diverged (last step only).

@@ -14,6 +14,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.envs.actions import choices
 from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_features import DefenderFeatures
+from spoofgym.envs.objectives import deviation_values
 from spoofgym.envs.observation import observation_space
 from spoofgym.envs.range_features import satellites_in_view
 from spoofgym.envs.standing import Standing, horizontal_error
@@ -257,7 +258,7 @@ class DefenderSeat:
 
     def reset_values(self) -> dict[str, Any]:
         """Infos after a reset, of all lanes."""
-        return {"epoch": self.simulation.epoch.index, "error": self.error}
+        return {"epoch": self.simulation.epoch.index, "error": self.error, **deviation_values(self.simulation)}
 
     def step_values(self, outcome: DefenderOutcome) -> dict[str, Any]:
         """Infos after a step, of all lanes."""
@@ -271,6 +272,7 @@ class DefenderSeat:
             "backtrack": outcome.backtrack,
             "reward_terms": {"error": outcome.error, "exclusion": outcome.exclusion},
             **self._satellite_values(outcome),
+            **deviation_values(self.simulation),
         }
 
     def _satellite_values(self, outcome: DefenderOutcome) -> dict[str, Runs]:

@@ -85,13 +85,19 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     ## Rewards
 
     The harm of a game is the mean over its epochs of what the horizontal error of the estimate is worth, in real time:
-    recomputing past epochs does not change the worth of their output.
+    recomputing past epochs does not change the worth of their output. Where the scenario has `guidance=`
+    (`docs/reference/guidance.md`), a payoff can be of the vehicle instead, and of where it is at epochs 1 to the last.
 
     | `payoff` | What one epoch is worth | Harm |
     |---|---|---|
     | `"error"` | the error, m, at most the scenario's `harm_cap` (200 m; 20 m on `song-robot`) | mean error, m |
     | `"error:CAP"` | the error, m, at most CAP | mean error, m |
     | `"beyond:LIMIT"` | 1 where the error exceeds LIMIT, m, else 0 | share of epochs |
+    | `"deviation"` | distance of the vehicle from its path, m, at most `harm_cap` | mean distance, m |
+    | `"deviation:CAP"` | the same distance, at most CAP | mean distance, m |
+    | `"target:EAST/NORTH"` | how much nearer to that place the vehicle is than its path, m | mean, m |
+
+    EAST and NORTH are metres from where the vehicle ought to be; the last payoff is negative where it is led away.
 
     The spoofer's reward of a step is what the epoch that the step resolves adds to the harm. The defender's reward is
     the negative of it. So the spoofer's return is the harm. If the filter diverges, this epoch and each that is left
@@ -111,7 +117,8 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
 
     ## Information
 
-    Of each agent, as in its own environment: `epoch`, `error`, `alarm`; `kappa` and `clock_error` of the spoofer;
+    Of each agent, as in its own environment: `epoch`, `error`, `alarm`; `deviation` where the scenario has `guidance=`;
+    `kappa` and `clock_error` of the spoofer;
     `used`, `coast`, `backtrack_asked`, `backtrack`, `satellites_left_out` and `satellites_ignored` of the defender.
     With the last step:
 
@@ -129,7 +136,7 @@ class DuelParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[Any]]):
     | `detectors` | as Defender-v0 | specification or `Detector`, or a tuple of them; both players may see them |
     | `knowledge` | `"shadow"` | what the spoofer knows: "blind", "shadow" or "full" |
     | `action` | `"rate"` | of the spoofer: "rate" or "innovation" |
-    | `payoff` | `"error"` | "error", "error:CAP" or "beyond:LIMIT", see above |
+    | `payoff` | `"error"` | "error", "beyond:LIMIT", "deviation" and others, see above |
     | `fidelity` | `"linear"` | "linear" (error states, one step per fix) or "strapdown" (IMU rate) |
     | `clean` | `0.5` | share of games without an attack |
     | `outage` | `0.15` | share of games in which the receiver loses GNSS for 10 to 40 s |

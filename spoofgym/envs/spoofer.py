@@ -33,6 +33,11 @@ class SpooferEnv(SingleEnv):
     moves all ranges as a receiver at the offset would see them, and pulls the receiver's clock as well. An error of
     the clock earns nothing, and detectors see a clock that jumps.
 
+    With `guidance=` in the scenario (`foi-drive:guidance=first-order:2`) the vehicle is steered by its own estimate
+    and leaves its path by about minus the error (`docs/reference/guidance.md`). `info["deviation"]` tells how far, and
+    `objective` lets the agent be paid for it. Nothing else changes: observations, alarms and errors are those of the
+    game without it.
+
     ```python
     import gymnasium
 
@@ -118,13 +123,23 @@ class SpooferEnv(SingleEnv):
     The error is the horizontal norm of estimate minus truth after the fix of an epoch has been used. The reward is
     the sum of two terms, which `info["reward_terms"]` holds:
 
-    - `growth`: growth of the error since the last step, over the scenario's `error_scale` (10 m on the Liu flight). A
-      step resolves the fix of the epoch before. The last step of an undetected game also resolves its own fix.
+    - `growth`: growth of the objective since the last step, over the scenario's `error_scale` (10 m on the Liu
+      flight). With `objective="error"` that is the error. A step resolves the fix of the epoch before. The last step
+      of an undetected game also resolves its own fix.
     - `forfeit`: at an alarm that ends the game, minus `forfeit` times all growth so far, including that of this step;
       otherwise 0. With `on_alarm="end"` a filter that diverges counts as an alarm.
 
-    So with `forfeit=1.0` the return times `error_scale` is the error at the end minus that at the start if
+    So with `forfeit=1.0` the return times `error_scale` is the objective at the end minus that at the start if
     undetected, and 0 if detected.
+
+    | `objective` | What it is at an epoch, m | Needs |
+    |---|---|---|
+    | `"error"` | the error | nothing |
+    | `"deviation"` | distance of the vehicle from its path, at the present epoch | `guidance=` in the scenario |
+    | `"target:EAST/NORTH"` | how much nearer the vehicle is to that place than its path is | `guidance=` |
+
+    EAST and NORTH are metres from where the vehicle ought to be. The vehicle answers late: an offset that is sent now
+    changes the estimate in the next step, and the deviation after it.
 
     ## Starting State
 
@@ -152,6 +167,8 @@ class SpooferEnv(SingleEnv):
       variance without it. 1 / σ_s is the sigma of the position as one innovation tells it. If κ is far below 1, the
       CPI has no power.
     - `clock_error`: estimate minus truth of the receiver's clock when last resolved, m (`coupling="tight"` only).
+    - `deviation`: distance of the vehicle from its path at the present epoch, m (with `guidance=` in the scenario
+      only).
     - `opponent`: name of the defender that the lane has drawn (where `response` is a pool only).
     - `outcome`: "diverged" if the filter diverged, "detected" if any alarm was raised in the game, else "undetected"
       (last step of a terminated game only).
@@ -169,6 +186,7 @@ class SpooferEnv(SingleEnv):
     | `on_alarm` | `"end"` | "end": an alarm ends the game; "respond": `response` decides and the game goes on |
     | `response` | `"exclude"` | who decides with `on_alarm="respond"`, see below |
     | `forfeit` | `1.0` | share of the growth that an alarm takes back |
+    | `objective` | `"error"` | whose growth is paid: "error", "deviation" or "target:EAST/NORTH", see Rewards |
     | `tracking_sigma` | `0.0` | see below, m |
     | `tracking_time` | `0.0` | correlation time of that error, s; 0: white |
     | `frames` | `1` | epochs that the observation holds, the present one included |

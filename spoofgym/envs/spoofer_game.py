@@ -12,6 +12,7 @@ from spoofgym.arrays import Runs
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.monitors import make_monitors
+from spoofgym.envs.objectives import make_objective
 from spoofgym.envs.opponents import make_defender
 from spoofgym.envs.spoofer_seat import OWNER, SpooferOutcome, SpooferSeat, frame_fields
 from spoofgym.envs.view import OneSeatGame
@@ -45,6 +46,8 @@ class SpooferGame(OneSeatGame):
         self.config = config
         with validation.argument(OWNER, "scenario"):
             scenario = make_scenario(config.scenario, config.coupling)
+        with validation.argument(OWNER, "objective"):
+            objective = make_objective(config.objective, scenario)
         detectors = make_monitors(OWNER, "detector", config.detector)
         names = [detector.name for detector in detectors]
         frame_fields(config, scenario, names, num_lanes)  # refuses what does not fit before thresholds are looked for
@@ -64,7 +67,7 @@ class SpooferGame(OneSeatGame):
             on_divergence="hold",
             streams=streams,
         )
-        self.seat = SpooferSeat(simulation, config, names)
+        self.seat = SpooferSeat(simulation, config, names, objective=objective)
         super().__init__(simulation, spoofer=self.seat, ends_on_alarm=config.on_alarm == "end")
 
     def step(self, actions: NDArray[Any], restarting: Runs | None = None) -> SpooferOutcome:

@@ -16,6 +16,7 @@ from spoofgym.detectors.cpi_theory import kappa
 from spoofgym.envs.actions import rates
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.frames import FrameStack, stacked_fields
+from spoofgym.envs.objectives import ErrorObjective, Objective, deviation_values
 from spoofgym.envs.observation import Field, Squash, observation_space, spoofer_fields
 from spoofgym.envs.shadow import shadow_filter
 from spoofgym.envs.standing import Standing, horizontal_error
@@ -42,7 +43,7 @@ class SpooferOutcome:
     """What one step of N lanes gave the spoofer.
 
     Attributes:
-        growth: reward for the growth of the error, (N,).
+        growth: reward for the growth of the objective, (N,).
         forfeit: what an alarm, or a filter that diverges, takes back, (N,).
         alarm: whether a detector alarmed in this epoch of the game, (N,).
         alarmed: whether one has alarmed since the game began, (N,).
@@ -115,7 +116,12 @@ class SpooferSeat:
     outcome: SpooferOutcome
 
     def __init__(
-        self, simulation: Simulation, config: SpooferConfig, detectors: Sequence[str], sees_decisions: bool = False
+        self,
+        simulation: Simulation,
+        config: SpooferConfig,
+        detectors: Sequence[str],
+        sees_decisions: bool = False,
+        objective: Objective | None = None,
     ) -> None:
         """Sit down.
 
@@ -124,6 +130,7 @@ class SpooferSeat:
             config: what the spoofer knows and does; its scenario, fidelity and response are those of the simulation.
             detectors: names of the simulation's detectors whose statistics a spoofer with knowledge "full" sees.
             sees_decisions: whether it sees what the defender decided last.
+            objective: whose growth it is paid for; None = the error.
 
         Raises:
             ValueError: the scenario does not offer what the spoofer needs, or the observation is too large.
@@ -148,7 +155,8 @@ class SpooferSeat:
         self._squash = Squash(fields)
         self._frames = FrameStack(num_lanes, config.frames, len(fields))
         self._resolved_error = np.zeros(num_lanes)
-        self._start_error = np.zeros(num_lanes)
+        self._objective = ErrorObjective() if objective is None else objective
+        self._value, self._start_value = np.zeros(num_lanes), np.zeros(num_lanes)
         self.offset = np.zeros((num_lanes, len(limits)))
         self._previous = self.offset
         self._velocity = scenario.velocity()
@@ -181,7 +189,9 @@ class SpooferSeat:
         error = horizontal_error(self.simulation)[lanes]
         self.error[lanes] = error
         self._resolved_error[lanes] = error
-        self._start_error[lanes] = error
+        value = self._objective.of(self.simulation)[lanes]
+        self._value[lanes] = value
+        self._start_value[lanes] = value
         self._read_clock(lanes)
         self.offset[lanes] = 0.0
         self._alarmed[lanes] = False
@@ -262,11 +272,12 @@ class SpooferSeat:
     def score(self, standing: Standing) -> None:
         """Pay for the step: put its rewards and ends into `outcome`."""
         error, scale = self._resolved_error, self.simulation.scenario.error_scale
+        value = self._objective.of(self.simulation) if self._objective.drives else error
         self._alarmed = self._alarmed | standing.alarm
         lost = standing.caught | standing.diverged if self.config.on_alarm == "end" else self._nobody
-        growth = (error - self.error) / scale
-        forfeit = np.where(lost, -self.config.forfeit * (error - self._start_error) / scale, 0.0)
-        self.error = error
+        growth = (value - self._value) / scale
+        forfeit = np.where(lost, -self.config.forfeit * (value - self._start_value) / scale, 0.0)
+        self.error, self._value = error, value.copy()
         self.outcome = SpooferOutcome(
             growth, forfeit, standing.alarm, self._alarmed, standing.diverged, standing.terminated
         )
@@ -309,7 +320,7 @@ class SpooferSeat:
 
     def reset_values(self) -> dict[str, Any]:
         """Infos after a reset, of all lanes."""
-        return {"epoch": self.simulation.epoch.index, "error": self.error, **self._clock_values()}
+        return {"epoch": self.simulation.epoch.index, "error": self.error, **self._further_values()}
 
     def step_values(self, outcome: SpooferOutcome) -> dict[str, Any]:
         """Infos after a step, of all lanes."""
@@ -319,7 +330,7 @@ class SpooferSeat:
             "alarm": outcome.alarm,
             "reward_terms": {"growth": outcome.growth, "forfeit": outcome.forfeit},
             **self._kappa_values(),
-            **self._clock_values(),
+            **self._further_values(),
         }
 
     def _kappa_values(self) -> dict[str, dict[str, Floats]]:
@@ -332,8 +343,10 @@ class SpooferSeat:
             information += response[:, measurement] ** 2
         return {"kappa": dict(zip(AXES, kappa(self.config.tracking_sigma, information).T, strict=True))}
 
-    def _clock_values(self) -> dict[str, Floats]:
-        return {"clock_error": self.clock_error} if self._ranges else {}
+    def _further_values(self) -> dict[str, Floats]:
+        """Of the receiver's clock and of the vehicle, where the game has them."""
+        clock = {"clock_error": self.clock_error} if self._ranges else {}
+        return clock | deviation_values(self.simulation)
 
     def end_values(self, outcome: SpooferOutcome) -> dict[str, Any]:
         """Infos of games that are over, of all lanes."""

@@ -27,6 +27,7 @@ from spoofgym.console import PlainConsole
 from spoofgym.detectors import make_detector
 from spoofgym.envs.config import DefenderConfig, configure
 from spoofgym.envs.duel_config import DuelDefenderConfig
+from spoofgym.envs.payoffs import PAYOFFS
 from spoofgym.evaluation.agent_scores import play_games
 from spoofgym.evaluation.defence import World, play_policy
 from spoofgym.evaluation.learning_curve import VALIDATION_FILE
@@ -70,7 +71,7 @@ def parser() -> argparse.ArgumentParser:
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
     add("--spoofer", metavar="SPEC",
         help="train in the duel, against this spoofer: ramp:0.5, training, policy:FOLDER, pool:A+B, ...")
-    add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
+    add("--payoff", metavar="SPEC", help=f"of the duel: {PAYOFFS} (default: error)")
     add_options(result, "runs/defender")
     add_settings(result, Settings)
     return result

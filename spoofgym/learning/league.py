@@ -32,7 +32,7 @@ from spoofgym.command_line import (
 )
 from spoofgym.console import console, show
 from spoofgym.envs.duel_config import DuelConfig
-from spoofgym.envs.payoffs import Beyond, Payoff, make_payoff
+from spoofgym.envs.payoffs import PAYOFFS, Beyond, Payoff, make_payoff
 from spoofgym.evaluation.defenders import fits
 from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.evaluation.engine import ENGINES, Engine, Here, make_engine
@@ -62,7 +62,7 @@ def parser() -> argparse.ArgumentParser:
     result = Parser(prog="spoofgym train league", examples=EXAMPLES, description=description)
     add = result.add_argument
     add("--scenario", default="foi-drive", help="what is driven or flown (default: %(default)s)")
-    add("--payoff", default="error", metavar="SPEC", help="error, error:CAP or beyond:LIMIT (default: %(default)s)")
+    add("--payoff", default="error", metavar="SPEC", help=f"{PAYOFFS} (default: %(default)s)")
     add("--knowledge", choices=KNOWLEDGE, default="shadow", help="of learned spoofers (default: %(default)s)")
     add("--clean", type=share, default=0.5, help="share of games without an attack (default: %(default)s)")
     add("--rounds", type=seed_number, default=5,

@@ -25,6 +25,8 @@ from spoofgym.command_line import Parser, count, share
 from spoofgym.console import PlainConsole
 from spoofgym.envs.config import ACTIONS, SpooferConfig, configure
 from spoofgym.envs.duel_config import DuelSpooferConfig
+from spoofgym.envs.objectives import SPELLINGS
+from spoofgym.envs.payoffs import PAYOFFS
 from spoofgym.evaluation.duels import with_detectors_of
 from spoofgym.learning import checkpoint, scripted_start
 from spoofgym.learning.curve import LearningCurve
@@ -58,10 +60,11 @@ def parser() -> argparse.ArgumentParser:
     add("--action", choices=ACTIONS, help="what the policy controls (default: rate)")
     add("--frames", type=count, help="epochs that the policy sees at once (default: 1)")
     add("--shadow", metavar="SPEC", help="scenario whose filter the spoofer takes for the victim's (default: its own)")
+    add("--objective", metavar="SPEC", help=f"of a single game: {SPELLINGS} (default: error)")
     add("--fidelity", choices=FIDELITIES, help="of the simulation (default: linear)")
     add("--defender", metavar="SPEC",
         help="train in the duel, against this defender: snapshot/exclude, px4-auto, policy:FOLDER, pool:A+B, ...")
-    add("--payoff", metavar="SPEC", help="of the duel: error, error:CAP or beyond:LIMIT (default: error)")
+    add("--payoff", metavar="SPEC", help=f"of the duel: {PAYOFFS} (default: error)")
     add("--clean", type=share, help="share of clean games in the duel, which teach a spoofer nothing (default: 0)")
     add_settings(result, Settings, {
         "scripted": "begin, in the duel, with the scripted or optimal attack that harms the defender most"
@@ -82,6 +85,8 @@ def asked_run(given: dict[str, Any]) -> Run:
     detectors = tuple(given.get("detector", ()))
     config: Any
     if "defender" in arguments:
+        if "objective" in arguments:
+            raise ValueError("--objective is of a game without a --defender; what a duel is played for is its --payoff")
         duel = configure(DuelSpooferConfig, {"clean": 0.0, "detectors": detectors or "snapshot", **arguments})
         if duel.clean == 1.0:
             raise ValueError("--clean 1 makes every game a clean one, which teaches a spoofer nothing: give less")

@@ -63,9 +63,11 @@ def loss_of(payoff: str, scenario: Scenario) -> Loss:
         scenario: of the game.
 
     Raises:
-        ValueError: it is unknown, or its number is out of range.
+        ValueError: it is unknown, its number is out of range, or it is not of the error.
     """
     made = make_payoff(payoff, scenario)
+    if made.objective.drives:
+        raise ValueError(f"the bound is of errors of the estimate, not of payoff {made.name!r}; valid: error, beyond")
     return beyond_loss(made.limit) if isinstance(made, Beyond) else error_loss(made.largest)
 
 

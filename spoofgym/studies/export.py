@@ -48,7 +48,7 @@ EXAMPLES = (
 
 OPTIONS = {
     SPOOFER: (
-        *("scenario", "detector", "detectors", "knowledge", "action", "frames", "shadow", "fidelity"),
+        *("scenario", "detector", "detectors", "knowledge", "action", "frames", "shadow", "fidelity", "objective"),
         *("defender", "payoff", "clean"),
     ),
     "defender": ("scenario", "attacks", "detectors", "bank", "fidelity", "spoofer", "payoff"),
