@@ -70,6 +70,17 @@ class Guidance(ABC):
         return nest(self.name)
 
     @property
+    def width(self) -> float:
+        """Of the corridor, m.
+
+        Raises:
+            ValueError: nobody has said it.
+        """
+        if self.corridor is None:
+            raise ValueError(f"guidance {self.name!r}: corridor must be given")
+        return self.corridor
+
+    @property
     @abstractmethod
     def dynamics(self) -> Floats:
         """F of x' = F x + g e, x = (d, and its rates where the order is above one), followed by g, (n, n + 1)."""
@@ -185,8 +196,7 @@ class Steering:
         Raises:
             ValueError: the vehicle has no direction of travel.
         """
-        assert guidance.corridor is not None
-        self._half = 0.5 * guidance.corridor
+        self._half = 0.5 * guidance.width
         self._axes = _unit_vectors(guidance, timeline, velocity)
         self._intervals = timeline.intervals
         self._transition = guidance.transition(self._intervals)

@@ -8,12 +8,15 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from spoofgym.arrays import Floats
+from spoofgym.evaluation.departures import Departure
 from spoofgym.evaluation.game_trace import (
     ALARM,
+    BACK,
     BACKTRACK,
     DIVERGENCE,
     END,
     EXCLUSION,
+    LEFT,
     ONSET,
     RESET,
     REUSE,
@@ -101,6 +104,8 @@ def _told(event: GameEvent, game: GameTrace) -> str:
         REUSE: "fixes are used again",
         RESET: "the filter is reset to the fix",
         DIVERGENCE: "the filter diverges, and the game ends",
+        LEFT: "the vehicle leaves its corridor",
+        BACK: "the vehicle is back in its corridor",
     }[event.kind]
 
 
@@ -110,6 +115,8 @@ def _sparklines(game: GameTrace, columns: int, bars: str) -> Iterator[str]:
         ("error, m", game.error),
         ("pull, m", np.linalg.norm(game.spoofed - game.true, axis=1)),
     ]
+    if game.departure is not None:
+        rows.append(("off the path, m", game.departure.deviation))
     for part in game.statistics:
         rows.append((f"{part.name.partition(':')[0]}/threshold", part.values / part.threshold))
     for label, values in rows:
@@ -153,12 +160,22 @@ def _letter(game: GameTrace, place: np.ndarray | Sequence[int]) -> str:
     return USED if game.used[place].all() else LEFT_OUT
 
 
+def _driven(game: GameTrace, departure: Departure) -> str:
+    worst, outside = int(departure.deviation.argmax()), int(np.count_nonzero(departure.outside))
+    return (
+        f"vehicle: at most {departure.deviation[worst]:.2f} m off its path (at {game.time[worst]:.6g} s), outside its "
+        f"corridor of {departure.corridor:g} m at {outside} of {len(game.time)} epochs"
+    )
+
+
 def _ending(game: GameTrace) -> Iterator[str]:
     worst = int(game.error.argmax())
     yield (
         f"horizontal error: mean {game.error.mean():.2f} m, at most {game.error[worst]:.2f} m (at "
         f"{game.time[worst]:.6g} s), {game.error[-1]:.2f} m at the end"
     )
+    if game.departure is not None:
+        yield _driven(game, game.departure)
     left_out, taken = int(np.count_nonzero(~game.used)), int(game.backtracked.sum())
     onset = game.first(ONSET)
     clean = game.alarm if onset is None else game.alarm[: onset.epoch]

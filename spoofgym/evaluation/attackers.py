@@ -15,6 +15,7 @@ from spoofgym.detectors.base import Detector
 from spoofgym.envs.policy_players import PolicySpoofer
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.aggregate import aggregate, aggregate_row, of_one_setting
+from spoofgym.evaluation.departure_rows import departure_entry, departure_figures
 from spoofgym.evaluation.game_log import GameLog
 from spoofgym.evaluation.metrics import AttackerScore, attacker_score, undetected_error
 from spoofgym.evaluation.monte_carlo import Episodes, watch_attack
@@ -70,8 +71,8 @@ class Evaluation:
         for policy in policies:
             player = PolicySpoofer(policy)
             with progress(player.name):
-                score, exact = self._score(player), self.exact(policy)
-            yield attacker_row(player.name, player.knowledge, score, exact, optimum)
+                (score, further), exact = self._score(player), self.exact(policy)
+            yield attacker_row(player.name, player.knowledge, score, exact, optimum) | further
 
     def check_attacks(self, attacks: list[Attack]) -> None:
         """Refuse attacks that do not fit the game, before anything is played.
@@ -96,22 +97,23 @@ class Evaluation:
         return searched_baselines(self.scenario, self._mean_score)
 
     def _row(self, baseline: Baseline, optimum: float | None, progress: Progress) -> dict[str, Any]:
-        score = None
+        score, further = None, {}
         if baseline.attack is not None:
             with progress(baseline.name):
-                score = self._score(baseline.attack, baseline.name)
-        return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum)
+                score, further = self._score(baseline.attack, baseline.name)
+        return attacker_row(baseline.name, baseline.knowledge, score, baseline.exact, optimum) | further
 
-    def _score(self, attack: Attack, name: str = "") -> AttackerScore:
-        """The figures of an attack, whose games are kept under a name: its own where none is given."""
+    def _score(self, attack: Attack, name: str = "") -> tuple[AttackerScore, dict[str, Any]]:
+        """The figures of an attack and of the vehicle, whose games are kept under a name: its own if none is given."""
         games = self.play(attack, self.episodes)
         self.log.note(
             name or attack.name,
             undetected_error_m=undetected_error(games),
             final_error_m=games.final_error,
             alarm_epoch=games.alarm_epoch,
+            **departure_figures(games.departures),
         )
-        return attacker_score(games)
+        return attacker_score(games), departure_entry(games.departures)
 
     def aggregates(self, policies: Sequence[LearnedSpoofer]) -> list[dict[str, Any]]:
         """A row for the policies of each setting of which there are several, when their games have been played."""

@@ -15,6 +15,7 @@ from spoofgym.envs.config import DefenderConfig
 from spoofgym.envs.defender_game import DefenderGame
 from spoofgym.envs.defender_seat import EXCLUDE
 from spoofgym.envs.opponents import spoofer_pool
+from spoofgym.evaluation.departures import Departures, departures_of, joined
 from spoofgym.evaluation.episodes import Act, GameBatch, SimulationBatch, play
 from spoofgym.navigation.interface import Decision, Demands
 from spoofgym.responses.base import Response
@@ -41,6 +42,7 @@ class DefenceEpisodes:
         member: the opponent, an index into ``names``, (n,); -1 = none.
         names: of the opponents.
         timeline: of the games.
+        departures: of the vehicles; None where they keep their paths.
     """
 
     error: Floats
@@ -51,11 +53,13 @@ class DefenceEpisodes:
     member: Runs
     names: tuple[str, ...]
     timeline: Timeline
+    departures: Departures | None = None
 
     def of(self, games: Any) -> DefenceEpisodes:
         """Some of the games."""
         parts = ("error", "excluded", "available", "attacked", "clean", "member")
-        return replace(self, **{name: getattr(self, name)[games] for name in parts})
+        departures = None if self.departures is None else self.departures.of(games)
+        return replace(self, departures=departures, **{name: getattr(self, name)[games] for name in parts})
 
 
 @dataclass(frozen=True)
@@ -270,10 +274,12 @@ class _Record:
             attack.member.copy(),
             tuple(attack.names),
             self._simulation.scenario.timeline,
+            departures_of(self._simulation),
         )
 
 
 def _join(parts: list[DefenceEpisodes]) -> DefenceEpisodes:
     names = ("error", "excluded", "available", "attacked", "clean", "member")
-    joined: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return replace(parts[0], **joined)
+    departures = joined([part.departures for part in parts])
+    whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[0], departures=departures, **whole)

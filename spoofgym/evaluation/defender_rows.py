@@ -12,6 +12,7 @@ from spoofgym.arrays import Floats
 from spoofgym.evaluation.aggregate import aggregate, aggregate_row, of_one_setting
 from spoofgym.evaluation.defence import DefenceEpisodes
 from spoofgym.evaluation.defence_metrics import DefenderScore, defender_score, difference, paired_difference
+from spoofgym.evaluation.departure_rows import departure_entry
 from spoofgym.policies.learned import LearnedDefender
 
 ORACLE_DEPTH = "oracle-depth"
@@ -41,6 +42,7 @@ def rows(played: Played, held_out: bool, pooled: str) -> list[dict[str, Any]]:
     parts += [(name, episodes.member == place) for place, name in enumerate(episodes.names)]
     return [
         _row(played.name, attack, held_out, defender_score(episodes.of(games)))
+        | departure_entry(episodes.of(games).departures)
         for attack, games in parts
         if games.any()
     ]

@@ -35,6 +35,7 @@ from spoofgym.evaluation.defender_rows import (
     per_game,
     rows,
 )
+from spoofgym.evaluation.departure_rows import departure_figures
 from spoofgym.evaluation.game_log import GameLog
 from spoofgym.evaluation.progress import Progress, silent
 from spoofgym.evaluation.report import defenders_report
@@ -216,8 +217,12 @@ class Defenders:
 def _better(one: DefenceEpisodes, other: DefenceEpisodes) -> DefenceEpisodes:
     """Of each game that one of the two in which the mean error is less."""
     less = other.error.mean(axis=1) < one.error.mean(axis=1)
+    departures = one.departures
+    if departures is not None and other.departures is not None:
+        departures = other.departures.where(less, departures)
     return replace(
         one,
+        departures=departures,
         error=np.where(less[:, None], other.error, one.error),
         excluded=np.where(less[:, None], other.excluded, one.excluded),
     )
@@ -281,7 +286,8 @@ def defenders_reports(
             kinds[item.name] = item.kind
             report_rows += rows(item, held_out, pooled)
             if log is not None:
-                log.note(item.name, population, mean_error_m=per_game(item), attack=attacks_of(item))
+                vehicle = departure_figures(item.episodes.departures)
+                log.note(item.name, population, mean_error_m=per_game(item), attack=attacks_of(item), **vehicle)
             report = defenders_report(scenario, fidelity, dict(kinds), list(report_rows), list(pairs), list(gaps))
             yield {**report, **one, "aggregates": list(together)}
         learned = [item for item in played if item.kind == "learned"]

@@ -20,7 +20,9 @@ from spoofgym.envs.opponents import make_defender, make_spoofer
 from spoofgym.envs.range_features import Bounding, direction_of, filter_protection_levels
 from spoofgym.envs.trained import spoofer_config
 from spoofgym.evaluation.benchmark_play import watched_by
+from spoofgym.evaluation.departures import Departure
 from spoofgym.evaluation.game_trace import GameTrace, Players, ProtectionLevel, Statistic
+from spoofgym.geodesy import horizontal
 from spoofgym.navigation.interface import Decision
 from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.policies.published import POLICY, policy_folder
@@ -110,6 +112,7 @@ class _Moment:
 
     time: float
     error: Floats
+    deviation: Floats
     offset: Floats
     attacked: bool
     sigma: tuple[float, float]
@@ -152,10 +155,12 @@ class _Recorder:
             levels = [*(float(level[0]) for level in filter_protection_levels(covariance)), *levels]
         sigma = float(np.sqrt(covariance[0, 0, 0] + covariance[0, 1, 1])), float(np.sqrt(covariance[0, 2, 2]))
         left_out = self._left_out(decision)
+        deviation = np.zeros(3) if simulation.steering is None else simulation.steering.deviation[0]
         simulation.resolve()
         return _Moment(
             time=float(epoch.time[0]),
             error=simulation.error[0].copy(),
+            deviation=deviation,
             offset=simulation.offset[0].copy(),
             attacked=bool(simulation.attacked[0]),
             sigma=sigma,
@@ -179,8 +184,9 @@ class _Recorder:
 
     def _trace(self, moments: list[_Moment]) -> GameTrace:
         simulation = self._simulation
-        true = simulation.scenario.track()[: len(moments)]
         column = {name: np.array([getattr(moment, name) for moment in moments]) for name in _Moment.__annotations__}
+        true = simulation.scenario.track()[: len(moments)] + column["deviation"]
+        guidance = simulation.scenario.guidance
         return GameTrace(
             players=self._players(),
             time=column["time"],
@@ -198,6 +204,7 @@ class _Recorder:
             reset=column["reset"],
             left_out=column["left_out"],
             diverged=bool(simulation.navigator.diverged[0]),
+            departure=guidance and Departure(horizontal(column["deviation"]), guidance.width),
         )
 
     def _players(self) -> Players:

@@ -18,6 +18,7 @@ import numpy as np
 
 from spoofgym import __version__
 from spoofgym.arrays import Flags, Floats, Runs
+from spoofgym.evaluation.departures import Departure
 from spoofgym.evaluation.plain_series import PlainReader, decimals, significant
 from spoofgym.geodesy import horizontal
 from spoofgym.validation import shown
@@ -26,6 +27,7 @@ KIND, SCHEMA_VERSION = "game", 1
 AXES = ("east", "north", "up")
 ONSET, END, ALARM, EXCLUSION = "onset", "end of the attack", "alarm", "exclusion"
 BACKTRACK, REUSE, RESET, DIVERGENCE = "backtrack", "re-use", "reset", "divergence"
+LEFT, BACK = "corridor left", "back in the corridor"
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,8 @@ class GameTrace:
     Attributes:
         players: who played on what.
         time: scenario time, (T,), s.
-        true: position of the vehicle, (T, 3), m ENU from where it is at epoch 0.
+        true: position of the vehicle, (T, 3), m ENU from where it is at epoch 0; beside its path where it is steered by
+            its estimate.
         estimated: by the filter after the decision on the epoch, (T, 3), m ENU: the real-time output.
         spoofed: where the spoofer's signals put the vehicle, (T, 3), m ENU; the true position where there is no attack.
         attacked: whether the fix is spoofed, (T,).
@@ -125,6 +128,7 @@ class GameTrace:
         reset: whether the filter was reset to the fix, (T,).
         left_out: satellites left out of a fix that is used, (T,); zero on fixes of position.
         diverged: whether the filter diverged in the last epoch.
+        departure: of the vehicle from its path; None where it keeps it.
     """
 
     players: Players
@@ -143,16 +147,17 @@ class GameTrace:
     reset: Flags
     left_out: Runs
     diverged: bool = False
+    departure: Departure | None = None
 
     @cached_property
-    def deviation(self) -> Floats:
+    def error_vector(self) -> Floats:
         """Estimated minus true position, (T, 3), m ENU."""
         return self.estimated - self.true
 
     @cached_property
     def error(self) -> Floats:
         """Horizontal error of the real-time output, (T,), m."""
-        return horizontal(self.deviation)
+        return horizontal(self.error_vector)
 
     @cached_property
     def alarm(self) -> Flags:
@@ -162,7 +167,7 @@ class GameTrace:
     @cached_property
     def events(self) -> tuple[GameEvent, ...]:
         """What happened, in order: attacks, alarms and exclusions where they begin."""
-        order = (ONSET, END, ALARM, BACKTRACK, EXCLUSION, REUSE, RESET, DIVERGENCE)
+        order = (ONSET, END, ALARM, LEFT, BACK, BACKTRACK, EXCLUSION, REUSE, RESET, DIVERGENCE)
         return tuple(sorted(self._events(), key=lambda event: (event.epoch, order.index(event.kind))))
 
     def first(self, kind: str) -> GameEvent | None:
@@ -190,6 +195,9 @@ class GameTrace:
             yield GameEvent(BACKTRACK, epoch, _epochs(int(self.backtracked[epoch])))
         for epoch in np.flatnonzero(self.reset).tolist():
             yield GameEvent(RESET, epoch)
+        if self.departure is not None:
+            for kind, epochs in ((LEFT, _begins(self.departure.outside)), (BACK, _ends(self.departure.outside))):
+                yield from (GameEvent(kind, epoch) for epoch in epochs)
         if self.diverged:
             yield GameEvent(DIVERGENCE, len(self.time) - 1)
 
@@ -198,7 +206,9 @@ class GameTrace:
         table: dict[str, Any] = {"epoch": np.arange(len(self.time)), "time_s": self.time}
         for name, series in (("true", self.true), ("estimated", self.estimated), ("spoofed", self.spoofed)):
             table |= {f"{name}_{axis}_m": series[:, place] for place, axis in enumerate(AXES)}
-        table |= {"attacked": self.attacked, "error_m": self.error, "error_up_m": self.deviation[:, 2]}
+        table |= {"attacked": self.attacked, "error_m": self.error, "error_up_m": self.error_vector[:, 2]}
+        if self.departure is not None:
+            table |= {"deviation_m": self.departure.deviation}
         table |= {"sigma_horizontal_m": self.sigma[:, 0], "sigma_up_m": self.sigma[:, 1]}
         for place, axis in enumerate(AXES):
             table[f"innovation_{axis}_m"] = self.innovation[:, place]
@@ -254,6 +264,7 @@ class GameTrace:
             "backtracked": _counts(self.backtracked),
             "reset": _counts(self.reset),
             "satellites_left_out": _counts(self.left_out),
+            **({} if self.departure is None else {"departure": _departure_json(self.departure)}),
             "events": [asdict(event) for event in self.events],
         }
 
@@ -292,6 +303,7 @@ class GameTrace:
             reset=reader.flags("reset", size),
             left_out=reader.counts("satellites_left_out", size),
             diverged=reader.flag("diverged"),
+            departure=_departure(reader.part("departure"), size) if reader.has("departure") else None,
         )
 
 
@@ -334,6 +346,14 @@ def _level(reader: PlainReader, length: int) -> ProtectionLevel:
         alert_limit=reader.number("alert_limit_m"),
         values=reader.floats("values_m", length),
     )
+
+
+def _departure(reader: PlainReader, length: int) -> Departure:
+    return Departure(reader.floats("deviation_m", length), reader.number("corridor_m"))
+
+
+def _departure_json(departure: Departure) -> dict[str, Any]:
+    return {"corridor_m": departure.corridor, "deviation_m": decimals(departure.deviation)}
 
 
 def _epochs(number: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.detectors.base import Detector, require_threshold
+from spoofgym.evaluation.departures import Departures, departures_of, joined
 from spoofgym.evaluation.episodes import SimulationBatch, play
 from spoofgym.geodesy import horizontal
 from spoofgym.scenario import Scenario
@@ -33,6 +35,7 @@ class Episodes:
         final_error: horizontal error after the last fix was used, (n,), m.
         onset_epoch: the last one before the attack, (n,); 0 where there is none.
         timeline: of the games.
+        departures: of the vehicles until the first alarm, or to the end; None where they keep their paths.
     """
 
     alarm_epoch: Runs
@@ -40,6 +43,7 @@ class Episodes:
     final_error: Floats
     onset_epoch: Runs
     timeline: Timeline
+    departures: Departures | None = None
 
     @property
     def detected(self) -> NDArray[np.bool_]:
@@ -58,6 +62,9 @@ class WatchedEpisodes:
         final_error: horizontal error after the last fix was used, (n,), m.
         onset_epoch: the last one before the attack, (n,); 0 where there is none.
         timeline: of the games.
+        alarm_departures: of the vehicles until each detector's first alarm, (D, n); of no meaning where there was none,
+            None where they keep their paths.
+        departures: to the end, (n,); None where they keep their paths.
     """
 
     alarm_epoch: Runs
@@ -66,21 +73,28 @@ class WatchedEpisodes:
     final_error: Floats
     onset_epoch: Runs
     timeline: Timeline
+    alarm_departures: Departures | None = None
+    departures: Departures | None = None
 
     def of(self, detector: int) -> Episodes:
         """As one detector, by its place, saw them."""
-        alarm_epoch, alarm_error = self.alarm_epoch[detector], self.alarm_error[detector]
-        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
+        return self._seen(detector)
 
     def together(self) -> Episodes:
         """As all detectors at once: the first alarm of any."""
         n = len(self.final_error)
         if not len(self.alarm_epoch):
-            return Episodes(np.full(n, NEVER), np.zeros(n), self.final_error, self.onset_epoch, self.timeline)
+            never = np.full(n, NEVER)
+            return Episodes(never, np.zeros(n), self.final_error, self.onset_epoch, self.timeline, self.departures)
         epoch = np.where(self.alarm_epoch == NEVER, np.iinfo(np.int64).max, self.alarm_epoch)
-        first, runs = epoch.argmin(axis=0), np.arange(n)
-        alarm_epoch, alarm_error = self.alarm_epoch[first, runs], self.alarm_error[first, runs]
-        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline)
+        return self._seen((epoch.argmin(axis=0), np.arange(n)))
+
+    def _seen(self, place: Any) -> Episodes:
+        """The games as the detectors at a place, one for all or one for each, saw them."""
+        alarm_epoch, alarm_error, departures = self.alarm_epoch[place], self.alarm_error[place], self.departures
+        if departures is not None and self.alarm_departures is not None:
+            departures = self.alarm_departures.of(place).where(alarm_epoch != NEVER, departures)
+        return Episodes(alarm_epoch, alarm_error, self.final_error, self.onset_epoch, self.timeline, departures)
 
 
 class _Watch:
@@ -96,6 +110,9 @@ class _Watch:
         self._alarm_epoch = np.full((detectors, runs), NEVER)
         self._alarm_error = np.zeros((detectors, runs))
         self._peak = np.full((detectors, runs), -np.inf)
+        now = departures_of(self._simulation)
+        shape = np.zeros((detectors, runs))
+        self._departures = None if now is None else Departures(shape, shape.copy(), now.corridor)
         self._begun, self._onset_epoch = np.zeros(runs, dtype=bool), np.zeros(runs, dtype=np.int64)
 
     def before(self, epoch: int) -> None:
@@ -120,6 +137,10 @@ class _Watch:
         fresh = (ratio > 1.0) & (self._alarm_epoch[place] == NEVER)
         self._alarm_epoch[place, fresh] = epoch
         self._alarm_error[place, fresh] = error[fresh]
+        now = departures_of(self._simulation)
+        if self._departures is not None and now is not None:
+            self._departures.largest[place, fresh] = now.largest[fresh]
+            self._departures.time_outside[place, fresh] = now.time_outside[fresh]
 
     def result(self) -> WatchedEpisodes:
         """All games of the batch, after their last fix was used."""
@@ -131,6 +152,8 @@ class _Watch:
             self._batch.error.copy(),
             self._onset_epoch,
             self._simulation.scenario.timeline,
+            self._departures,
+            departures_of(self._simulation),
         )
 
 
@@ -142,6 +165,8 @@ def _join(parts: list[WatchedEpisodes]) -> WatchedEpisodes:
         np.concatenate([part.final_error for part in parts]),
         np.concatenate([part.onset_epoch for part in parts]),
         parts[0].timeline,
+        joined([part.alarm_departures for part in parts], axis=1),
+        joined([part.departures for part in parts]),
     )
 
 

@@ -43,6 +43,10 @@ class PlainReader:
             raise ValueError(f"{owner} must be a JSON object, got {shown(content)}")
         self.owner, self._content = owner, content
 
+    def has(self, name: str) -> bool:
+        """Whether there is such a member."""
+        return name in self._content
+
     def member(self, name: str) -> Any:
         """A member as it is.
 

@@ -12,6 +12,8 @@ from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import NoAttack
 from spoofgym.detectors.base import Detector
+from spoofgym.evaluation.departure_rows import departure_entry
+from spoofgym.evaluation.departures import departures_of
 from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import interpolate
 from spoofgym.scenario import Scenario
@@ -67,8 +69,9 @@ def recorded_rows(
         max_error_m (largest horizontal error after the onset), error_epochs (after the onset, whose error is known:
         those in a hole of the reference have none), alarms_after_end (after the last spoofed fix, as far as the clean
         log has none there), recovery_s (from the last spoofed fix until the filter is back within `RECOVERED` of that
-        of the clean log, for good). None where a thing does not exist: clean errors without a reference, the largest of
-        no errors, time and error of a detection that did not happen, what follows the end of an attack that has none.
+        of the clean log, for good); deviation (of the whole game) where the vehicle is steered by its estimate. None
+        where a thing does not exist: clean errors without a reference, the largest of no errors, time and error of a
+        detection that did not happen, what follows the end of an attack that has none.
         An alarm without an attack is no detection, nor is one that comes at the same epoch of the clean log.
 
     Raises:
@@ -209,4 +212,5 @@ def _play(
         "error_epochs": len(errors),
         "alarms_after_end": None if attack.end is None else after_end,
         "recovery_s": max((departed or attack.end) - attack.end, 0.0) if back and attack.end is not None else None,
+        **departure_entry(departures_of(simulation)),
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spoofgym.evaluation.game_trace import ALARM, BACKTRACK, EXCLUSION, ONSET, REUSE, GameTrace, Statistic
+from spoofgym.evaluation.game_trace import ALARM, BACKTRACK, EXCLUSION, LEFT, ONSET, REUSE, GameTrace, Statistic
 from spoofgym.report.figures import GameFigure, Section
 
 
@@ -33,7 +33,7 @@ def _watching(part: Statistic) -> str:
 
 def game_story(game: GameTrace) -> str:
     """What happened, in plain sentences."""
-    sentences = [_spoofing(game), _alarms(game), *_decisions(game), _errors(game)]
+    sentences = [_spoofing(game), _alarms(game), *_decisions(game), _errors(game), _driven(game)]
     if game.diverged:
         sentences.append(f"The filter diverged at {_time(game, len(game.time) - 1)}.")
     return " ".join(sentence for sentence in sentences if sentence)
@@ -84,6 +84,16 @@ def _decisions(game: GameTrace) -> list[str]:
     if reuse:
         sentences.append(f"GNSS is used again {'once' if len(reuse) == 1 else f'{len(reuse)} times'}.")
     return sentences
+
+
+def _driven(game: GameTrace) -> str:
+    if game.departure is None:
+        return ""
+    most, width = float(game.departure.deviation.max()), game.departure.corridor
+    left = game.first(LEFT)
+    corridor = f"its corridor of {width:g} m"
+    where = f"leaves {corridor} at {_time(game, left.epoch)}" if left else f"keeps within {corridor}"
+    return f"The vehicle, which is steered by its estimate, {where}; it is {most:.1f} m off its path at most."
 
 
 def _errors(game: GameTrace) -> str:

@@ -12,6 +12,7 @@ from rich.text import Text
 from spoofgym import files
 from spoofgym.evaluation.defender_rows import LEARNED_MEAN
 from spoofgym.figures import new_figure
+from spoofgym.studies.departure_presentation import departures_tables
 from spoofgym.studies.presentation import aggregates_tables, number, plain
 
 COLOURS = {
@@ -60,6 +61,7 @@ def defenders_tables(report: dict[str, Any]) -> Group:
             attacks = report.get("attack") or f"{population} attacks"
             title = f"{report['scenario']}, {report['fidelity']}: {attacks}, half of the games clean"
             parts += [_table(title, "defender", pooled, learned), ""]
+            parts += [part for table in departures_tables("defender", pooled, "in whole games") for part in (table, "")]
         if pooled and learned:
             by_attack = [row for row in of_set if row["defender"] == learned[0] and not _is_pooled(row)]
             parts += [_table(f"{learned[0]} by attack: {attacks}", "attack", by_attack, []), ""] if by_attack else []

@@ -45,7 +45,7 @@ def test_a_game_is_the_simulation_that_it_was_played_in(game: GameTrace) -> None
         assert game.alarm[epoch] == simulation.alarm[0]
         np.testing.assert_allclose(game.spoofed[epoch] - game.true[epoch], simulation.offset[0], atol=1e-9)
         simulation.resolve()
-        np.testing.assert_allclose(game.deviation[epoch], simulation.error[0], atol=1e-9)
+        np.testing.assert_allclose(game.error_vector[epoch], simulation.error[0], atol=1e-9)
         assert game.used[epoch] == simulation.used[0]
         assert game.backtracked[epoch] == simulation.navigator.backtracked[0]
         if epoch < 60:

@@ -11,6 +11,8 @@
     backtrack: { shape: "back", glyph: "◀", dash: [8, 3, 2, 3] },
     "re-use": { shape: "circle", glyph: "●", dash: [4, 4] },
     reset: { shape: "down", glyph: "▼", dash: [1, 3] },
+    "corridor left": { shape: "down", glyph: "▽", dash: [12, 3] },
+    "back in the corridor": { shape: "circle", glyph: "○", dash: [3, 6] },
     divergence: { shape: "cross", glyph: "✕", dash: [] },
   };
   const CHIPS = 14;
@@ -82,7 +84,7 @@
   function table(game) {
     const series = [["epoch", game.time.map((_, k) => k)], ["time_s", game.time]];
     for (const kind of ["true", "estimated", "spoofed"]) AXES.forEach((axis) => series.push([`${kind}_${axis}_m`, game[`${kind}_m`][axis]]));
-    series.push(["attacked", game.attacked], ["error_m", game.error_m], ["sigma_horizontal_m", game.sigma_m.horizontal], ["sigma_up_m", game.sigma_m.up]);
+    series.push(["attacked", game.attacked], ["error_m", game.error_m], ...(game.departure ? [["deviation_m", game.departure.deviation_m]] : []), ["sigma_horizontal_m", game.sigma_m.horizontal], ["sigma_up_m", game.sigma_m.up]);
     AXES.forEach((axis) => series.push([`innovation_${axis}_m`, game.innovation_m[axis]], [`innovation_sigma_${axis}_m`, game.innovation_sigma_m[axis]]));
     game.statistics.forEach((part) => series.push([`statistic of ${part.name}`, part.values], [`threshold of ${part.name}`, game.time.map(() => part.threshold)]));
     game.protection_levels.forEach((level) => series.push([`protection level ${level.direction} of ${level.name}, m`, level.values_m]));

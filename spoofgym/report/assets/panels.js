@@ -12,6 +12,7 @@
     const lines = () => [
       { name: "horizontal error, m", values: game.error, colour: page.colour("estimated"), width: 2.5 },
       { name: "vertical error", values: game.errorUp, colour: page.colour("c4"), dash: [7, 3] },
+      ...(game.departure ? [{ name: "vehicle off its path, m", values: game.departure.deviation_m, colour: page.colour("c3"), dash: [3, 2] }] : []),
       { name: "offset of the fix", values: game.offset, colour: page.colour("spoofed"), dash: [2, 3] },
       { name: "sigma that the filter predicts", values: game.sigma_m.horizontal, colour: page.colour("c7"), dash: [9, 3, 2, 3], width: 1.5 },
       ...levels.map((level, place) => ({
@@ -23,7 +24,7 @@
       })),
       ...limits.map(([name, limit]) => ({ name, values: game.time.map(() => limit), colour: page.colour("bad"), dash: [10, 3], width: 1 })),
     ];
-    let top = 1.08 * Math.max(largest([game.error, game.errorUp, ...levels.map((level) => level.values_m)]), 1.3 * largest([game.sigma_m.horizontal]), 1);
+    let top = 1.08 * Math.max(largest([game.error, game.errorUp, game.departure ? game.departure.deviation_m : [], ...levels.map((level) => level.values_m)]), 1.3 * largest([game.sigma_m.horizontal]), 1);
     const named = new Map(levels.map((level) => [`alert limit, ${level.direction}`, level.alert_limit_m]));
     const limits = [...named].filter(([, limit]) => limit < 2 * top);
     if (limits.length) top = Math.max(top, ...limits.map(([, limit]) => 1.05 * limit));

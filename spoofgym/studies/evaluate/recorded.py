@@ -10,6 +10,8 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+from rich.console import Group
+
 from spoofgym.attacks.base import Attack
 from spoofgym.calibration import calibrated_for_play
 from spoofgym.command_line import STDOUT, Parser, add_figure, add_import, add_json, add_seed, share_of_alarms
@@ -24,6 +26,7 @@ from spoofgym.evaluation.report import recorded_report
 from spoofgym.program import last_of, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.departure_presentation import departures_tables
 from spoofgym.studies.giving import Output, give
 from spoofgym.studies.presentation import recorded_figure, recorded_table
 
@@ -63,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     terminal = console(stderr=options.json == STDOUT)
     report = _report(options, terminal.progress)
     outputs: list[Output] = [("figure", options.figure, partial(recorded_figure, report))]
-    give(report, recorded_table(report), options.json, terminal, outputs)
+    tables = Group(recorded_table(report), *departures_tables("attack", report["rows"], "to the end of the log"))
+    give(report, tables, options.json, terminal, outputs)
     return 0
 
 

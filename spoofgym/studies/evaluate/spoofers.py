@@ -42,6 +42,7 @@ from spoofgym.policies.learned import LearnedSpoofer
 from spoofgym.program import last_of, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.specification import registered_by_others
+from spoofgym.studies.departure_presentation import departures_tables
 from spoofgym.studies.evaluate.attackers import spoofers
 from spoofgym.studies.giving import Output, give
 from spoofgym.studies.notes import tell_what_is_new
@@ -93,7 +94,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ("figure", options.figure, partial(attackers_figure, report)),
         ("games", options.games, log.write),
     ]
-    give(report, Group(attackers_table(report), *aggregates_tables(report)), options.json, terminal, outputs)
+    vehicles = departures_tables("attacker", report["rows"], "until the first alarm")
+    tables = Group(attackers_table(report), *vehicles, *aggregates_tables(report))
+    give(report, tables, options.json, terminal, outputs)
     return 0
 
 
