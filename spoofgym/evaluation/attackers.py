@@ -97,7 +97,8 @@ class Evaluation:
         return searched_baselines(self.scenario, self._mean_score)
 
     def _row(self, baseline: Baseline, optimum: float | None, progress: Progress) -> dict[str, Any]:
-        score, further = None, {}
+        score: AttackerScore | None = None
+        further: dict[str, Any] = {}
         if baseline.attack is not None:
             with progress(baseline.name):
                 score, further = self._score(baseline.attack, baseline.name)

@@ -186,7 +186,9 @@ class _Recorder:
         simulation = self._simulation
         column = {name: np.array([getattr(moment, name) for moment in moments]) for name in _Moment.__annotations__}
         true = simulation.scenario.track()[: len(moments)] + column["deviation"]
-        guidance = simulation.scenario.guidance
+        guidance, departure = simulation.scenario.guidance, None
+        if guidance is not None:
+            departure = Departure(horizontal(column["deviation"]), guidance.width)
         return GameTrace(
             players=self._players(),
             time=column["time"],
@@ -204,7 +206,7 @@ class _Recorder:
             reset=column["reset"],
             left_out=column["left_out"],
             diverged=bool(simulation.navigator.diverged[0]),
-            departure=guidance and Departure(horizontal(column["deviation"]), guidance.width),
+            departure=departure,
         )
 
     def _players(self) -> Players:
