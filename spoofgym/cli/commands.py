@@ -87,6 +87,8 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("study wrong-shadow", "a spoofer with another filter in mind", f"{STUDIES}.wrong_shadow"),
         Command("study fidelity-of-thresholds", "thresholds in both fidelities", f"{STUDIES}.fidelity_of_thresholds"),
         Command("study recorded-ranges", "loose and tight filters on a log", f"{STUDIES}.recorded_ranges"),
+        Command("study fusion-ripper", "FusionRipper on a drive, published and ours", f"{STUDIES}.fusion_ripper"),
+        Command("study delay", "what a defender's delay costs on the road", f"{STUDIES}.delay"),
     ),
 }
 """In the order in which a newcomer meets them."""

@@ -58,7 +58,8 @@ def test_an_objective_is_refused_where_it_does_not_fit(tmp_path: Path, capsys: p
 
 def test_a_league_is_played_for_the_deviation(tmp_path: Path) -> None:
     command = [*SHORT, "--payoff", "deviation", "--rounds", "0", "--workers", "1", "--out", str(tmp_path / "league")]
-    players = ["--spoofer", "ramp:2", "--spoofer", "none", "--defender", "always-use", "--defender", "always-exclude"]
+    players = ["--spoofer", "ramp:2,direction=0", "--spoofer", "none", "--defender", "always-use"]
+    players += ["--defender", "always-exclude"]
     assert league.main([*command, *players, "--resamples", "20", "--json", str(tmp_path / "out.json")]) == 0
     (found,) = json.loads((tmp_path / "out.json").read_text())["results"]
     ramp, nobody = found["mean"]
