@@ -22,7 +22,8 @@ ONLY_PARSED = {
     **dict.fromkeys(("train spoofer", "train defender", "train league", "exploit"), TRAINS),
     **dict.fromkeys(("benchmark", "bound bayes", "bound duel", "integrity", "matrix", "thresholds"), MINUTES),
     **dict.fromkeys(("reproduce", "study acna", "study self-tuning", "study patient-spoofer"), MINUTES),
-    **dict.fromkeys(("study fidelity-of-thresholds", "study recorded-ranges", "study delay", "evaluate defenders"), MINUTES),
+    **dict.fromkeys(("study fidelity-of-thresholds", "study recorded-ranges", "study delay"), MINUTES),
+    **dict.fromkeys(("evaluate defenders",), MINUTES),
 }
 """Programs that no page runs in a few seconds."""
 MANY_GAMES = re.compile(r"^spoofgym evaluate spoofers (?!.*--episodes \d{1,3}\b|.*--episodes 1000\b)")

@@ -33,6 +33,7 @@ SCENARIOS = {
     "kujur": TIGHT,
     "song": ROBOT,
 }
+GUIDED = ("first-order:2", "second-order:2/axes=horizontal")
 HISTORY = 6
 
 
@@ -108,6 +109,15 @@ def decided(text: str, fidelity: str) -> Arrays:
     return trace(simulation, decide, lambda simulation: {"auxiliary": np.array(simulation.navigator.auxiliary_offset)})
 
 
+def guided(guidance: str) -> Arrays:
+    """Vehicles that are steered by their estimates, in a turn, and what becomes of them."""
+    simulation = make(make_scenario(f"{SCENARIOS['foi-turn']},guidance={guidance}"), "ramp:1")
+    steering = simulation.steering
+    assert steering is not None
+    played = trace(simulation, see=lambda _: {"deviation": steering.deviation, "largest": steering.largest})
+    return {name: played[name] for name in ("error", "deviation", "largest")}
+
+
 def responded(text: str, name: str, fidelity: str) -> Arrays:
     """A response to detectors that soon alarm."""
     threshold = 300.0 if text == TIGHT else 60.0
@@ -148,5 +158,6 @@ def episodes() -> dict[str, Callable[[], Arrays]]:
                 for fidelity in scenario.fidelities:
                     key = f"response {name} {scenario.name} {fidelity}"
                     all_of[key] = partial(responded, text, name, fidelity)
+    all_of |= {f"guided {guidance}": partial(guided, guidance) for guidance in GUIDED}
     all_of |= {f"attack {name}": partial(attacked, name) for name in ATTACKS}
     return all_of
