@@ -67,6 +67,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     "recorded logs": (
         Command("import", "make a log folder of what others have recorded", f"{STUDIES}.import_log"),
         Command("check-log", "units, axes, clocks, holes and signs of a log", f"{STUDIES}.check_log"),
+        Command("estimate-noise", "process and measurement noise of a log", f"{STUDIES}.estimate_noise"),
     ),
     "learn": (
         Command("train spoofer", "train a PPO spoofer", f"{LEARNING}.spoofer"),
@@ -86,6 +87,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("study patient-spoofer", "a spoofer that waits for a reset", f"{STUDIES}.patient_spoofer"),
         Command("study wrong-shadow", "a spoofer with another filter in mind", f"{STUDIES}.wrong_shadow"),
         Command("study fidelity-of-thresholds", "thresholds in both fidelities", f"{STUDIES}.fidelity_of_thresholds"),
+        Command("study noise", "filters before and after their noises are estimated", f"{STUDIES}.blind_noise"),
         Command("study recorded-ranges", "loose and tight filters on a log", f"{STUDIES}.recorded_ranges"),
         Command("study fusion-ripper", "FusionRipper on a drive, published and ours", f"{STUDIES}.fusion_ripper"),
         Command("study delay", "what a defender's delay costs on the road", f"{STUDIES}.delay"),

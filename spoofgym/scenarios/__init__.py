@@ -48,7 +48,9 @@ def _log_state(text: str) -> State | None:
         return None
     given = Specification.parse(text)
     folder = given.options.get("path", given.value)
-    return log_state(folder) if given.name == "recorded" and folder is not None else None
+    if given.name != "recorded" or folder is None:
+        return None
+    return log_state(folder, given.options.get("noise"))
 
 
 def _made(scenario: Any) -> Scenario:

@@ -22,6 +22,8 @@ from spoofgym.logs.checks.check import check_ranges_of, checked_log
 from spoofgym.logs.fix_rows import DEFAULT_SIGMA
 from spoofgym.logs.lever_arm import with_velocity_at_imu
 from spoofgym.logs.log import Log
+from spoofgym.logs.log_files import NOISE
+from spoofgym.logs.log_noise import LogNoise, read_noise
 from spoofgym.logs.log_warning import warn
 from spoofgym.logs.range_epochs import range_epochs
 from spoofgym.logs.range_fixes import range_fixes
@@ -37,6 +39,8 @@ from spoofgym.specification import spell
 
 FIXES = ("phone", "ranges")
 """Which fixes a filter may take: those in the log, or those made from its raw ranges."""
+ESTIMATED = "estimated"
+"""The option ``noise`` that names the file in the folder of the log."""
 DRAG_OFF_RATE = (4.0, 4.0, 4.0)
 """Largest rate of a spoofed position per axis, and of a spoofed clock, m/s."""
 ALIGNMENT_VELOCITY_SIGMA = (0.5, 0.5, 0.5)
@@ -59,6 +63,7 @@ def recorded(
     alignment: str | None = None,
     least_speed: float | None = None,
     guidance: str | None = None,
+    noise: str | None = None,
 ) -> Scenario:
     """A log in the project's format as a game.
 
@@ -80,10 +85,13 @@ def recorded(
         guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
             with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
             keeps its path whatever it estimates.
+        noise: what the filter believes in place of grade, noise_factor and sigma_floor: ``estimated``, the file
+            ``noise.toml`` of the log, which ``spoofgym estimate-noise`` writes, or another such file; None = nothing.
 
     Raises:
         ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
-            horizon outside it, a number that is not positive, or options that do not go together.
+            horizon outside it, a number that is not positive, a file of noises that is missing or wrong, or options
+            that do not go together.
     """
     path = str(Path(path))
     if "," in path:
@@ -101,6 +109,11 @@ def recorded(
         least_speed = validation.above("recorded", "least_speed", least_speed)
     if coupling == "tight" and (velocity is not None or sigma_floor != SIGMA_FLOOR or fixes != FIXES[0]):
         raise ValueError("recorded: velocity, sigma_floor and fixes are of fixes; coupling=tight takes none")
+    if noise is not None and "," in noise:
+        raise ValueError(f"recorded: noise must not contain a comma, which separates options; got {noise!r}")
+    if noise is not None and (noise_factor != NOISE_FACTOR or sigma_floor != SIGMA_FLOOR or coupling == "tight"):
+        raise ValueError("recorded: noise takes the place of noise_factor and sigma_floor, and needs coupling=loose")
+    believed = None if noise is None else read_noise(noise_file(path, noise))
     options = {
         "grade": (grade, "automotive"),
         "onset": (None if onset is None else np.format_float_positional(onset, trim="-"), None),
@@ -112,6 +125,7 @@ def recorded(
         "coupling": (coupling, COUPLINGS[0]),
         "alignment": (alignment, None),
         "least_speed": (least_speed, None),
+        "noise": (noise, None),
     }
     name = spell("recorded", path, **{key: value for key, (value, default) in options.items() if value != default})
     tuning = FilterTuning(
@@ -122,7 +136,7 @@ def recorded(
         process_noise_scale=noise_factor**2,
         measurement_sigma=DEFAULT_SIGMA,
     )
-    asked = _Fixes(fixes, velocity, sigma_floor)
+    asked = _Fixes(fixes, velocity, sigma_floor, believed)
     common = {"name": name, "grade": imu, "tuning": tuning, "onset": onset, "horizon": horizon}
     common |= {"aligned": alignment, "least_speed": least_speed}
     log = checked_log(path)
@@ -133,6 +147,11 @@ def recorded(
     return made.guided(guidance, "lateral")
 
 
+def noise_file(path: str, noise: str) -> Path:
+    """The file that the option ``noise`` of a log in the folder ``path`` names."""
+    return Path(path) / NOISE if noise == ESTIMATED else Path(noise)
+
+
 @dataclass(frozen=True)
 class _Fixes:
     """What a user says of the fixes; as in `recorded`."""
@@ -140,6 +159,7 @@ class _Fixes:
     kind: str
     velocity: bool | None
     sigma_floor: float
+    noise: LogNoise | None
 
 
 def _loose(log: Log, asked: _Fixes, *, tuning: FilterTuning, **common: Any) -> RecordedFixes:
@@ -149,7 +169,7 @@ def _loose(log: Log, asked: _Fixes, *, tuning: FilterTuning, **common: Any) -> R
     log = with_velocity_at_imu(checked_reference(log))
     if asked.velocity is False or (asked.velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
-    return RecordedFixes(log=log, tuning=tuning, sigma_floor=asked.sigma_floor, **common)
+    return RecordedFixes(log=log, tuning=tuning, sigma_floor=asked.sigma_floor, noise=asked.noise, **common)
 
 
 def _tight(log: Log, asked: _Fixes, **common: Any) -> RecordedRanges:

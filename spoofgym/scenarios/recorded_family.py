@@ -114,6 +114,11 @@ class RecordedFamily(Immutable, ABC):
         """Of the error of the alignment, (15,)."""
 
     @property
+    def _filter_density(self) -> Floats:
+        """The filter's process noise, (15,), unit²/s."""
+        return self.tuning.noise_density(self.grade)
+
+    @property
     def align_time(self) -> float:
         """Of the fix that the filter starts from, s."""
         return float(self.log.fixes.time[self.alignment.fix])
@@ -233,7 +238,7 @@ class RecordedFamily(Immutable, ABC):
             lever_arm=self.log.lever_arm,
             latency_samples=0,
             measurement_covariance=covariance,
-            filter_density=self.tuning.noise_density(self.grade),
+            filter_density=self._filter_density,
             true_noise=np.zeros(9),
             instability_sigma=np.zeros(6),
             instability_decay=1.0,

@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from spoofgym.arrays import Floats, Runs
+from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.logs.fix_rows import UNMEASURED_SIGMA
 from spoofgym.logs.log import velocity_of
+from spoofgym.logs.log_noise import LogNoise
 from spoofgym.logs.spoofed_fixes import RecordedSpoof, recorded_spoof
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.facts import INERTIAL_SOLUTION
@@ -34,11 +35,14 @@ class RecordedFixes(RecordedFamily, FixFamily):
     Attributes:
         tuning: what the filter believes; its measurement sigmas hold where the log states none.
         sigma_floor: smallest 1 sigma of a fix that the filter believes, m and m/s.
+        noise: estimated noises, which the filter believes in place of those of ``grade``, ``tuning`` and
+            ``sigma_floor``; None = there are none.
     """
 
     offers = (INERTIAL_SOLUTION,)
 
     sigma_floor: float = SIGMA_FLOOR
+    noise: LogNoise | None = None
 
     def __post_init__(self) -> None:
         if self.dimension == 6 and self.log.fixes.velocity is None:
@@ -80,24 +84,49 @@ class RecordedFixes(RecordedFamily, FixFamily):
         sigma[6:9] = self._measurement_sigma[0, :3]
         return sigma
 
+    @property
+    def _filter_density(self) -> Floats:
+        return super()._filter_density if self.noise is None else self.noise.density
+
     @cached_property
-    def _measurement_sigma(self) -> Floats:
-        """Of each epoch's fix, (E, m), m and m/s."""
+    def stated_sigma(self) -> Floats:
+        """Of each epoch's fix as the log states it, or by default, (E, m), m and m/s."""
         fixes, size = self.log.fixes, (len(self.epoch_time), 3)
         columns = []
         for place, stated in ((0, fixes.position_sigma), (3, fixes.velocity_sigma)):
             if place < self.dimension:
                 default = np.broadcast_to(self.tuning.measurement_sigma[place : place + 3], size)
                 columns.append(default if stated is None else stated[self._fix])
-        sigma = np.maximum(np.hstack(columns), self.sigma_floor)
-        if fixes.velocity is not None and not fixes.velocity[:, 2].any():  # the receiver fills it without measuring
-            sigma[:, 5:] = UNMEASURED_SIGMA
-        return sigma
+        return np.hstack(columns)
+
+    @cached_property
+    def measured(self) -> Flags:
+        """Components of the fixes that are measured, (E, m): some only fill a column of the log."""
+        measured = self.stated_sigma < UNMEASURED_SIGMA
+        velocity = self.log.fixes.velocity
+        if velocity is not None and not velocity[:, 2].any():
+            measured[:, 5:] = False
+        return measured
+
+    @cached_property
+    def _measurement_sigma(self) -> Floats:
+        """Of each epoch's fix, (E, m), m and m/s."""
+        return self.believed_sigma(self.noise)
+
+    def believed_sigma(self, noise: LogNoise | None) -> Floats:
+        """1 sigma of the white error of each epoch's fix that a filter believes, (E, m), m and m/s.
+
+        Args:
+            noise: estimated; None = by the stated sigmas and ``sigma_floor``.
+        """
+        stated = self.stated_sigma
+        sigma = np.maximum(stated, self.sigma_floor) if noise is None else noise.fix_sigma(stated)
+        return np.where(self.measured, sigma, UNMEASURED_SIGMA)
 
     @property
     def unmeasured(self) -> Runs:
         """Velocities that the receiver fills without measuring them, at each epoch after the alignment, (E,)."""
-        return np.add.reduce(self._measurement_sigma >= UNMEASURED_SIGMA, axis=1, dtype=np.int64)
+        return np.add.reduce(~self.measured, axis=1, dtype=np.int64)
 
     @cached_property
     def clean(self) -> CleanRun:

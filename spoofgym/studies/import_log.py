@@ -39,14 +39,15 @@ def parser() -> argparse.ArgumentParser:
     result.add_argument("--name", help="of the log (default: the name of its folder)")
     axes = "of the inertial sensor: forward, right, down, left, up; unknown = found from the drive"
     result.add_argument("--axes", choices=AXES, help=f"{axes} (default: what the source says)")
-    result.add_argument("--begin", type=_moment, metavar="S", help="leave out what is earlier, on the source's clock")
-    result.add_argument("--end", type=_moment, metavar="S", help="leave out what is later")
+    result.add_argument("--begin", type=moment, metavar="S", help="leave out what is earlier, on the source's clock")
+    result.add_argument("--end", type=moment, metavar="S", help="leave out what is later")
     result.add_argument("--imu-topic", metavar="TOPIC", help="of a ROS bag with several")
     result.add_argument("--fix-topic", metavar="TOPIC", help="of a ROS bag with several")
     return result
 
 
-def _moment(text: str) -> float:
+def moment(text: str) -> float:
+    """A time on the clock of a log, s."""
     try:
         value = float(text)
     except ValueError:

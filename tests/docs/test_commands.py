@@ -24,6 +24,7 @@ ONLY_PARSED = {
     **dict.fromkeys(("reproduce", "study acna", "study self-tuning", "study patient-spoofer"), MINUTES),
     **dict.fromkeys(("study fidelity-of-thresholds", "study recorded-ranges", "study delay"), MINUTES),
     **dict.fromkeys(("evaluate defenders",), MINUTES),
+    "study noise": MINUTES,
 }
 """Programs that no page runs in a few seconds."""
 MANY_GAMES = re.compile(r"^spoofgym evaluate spoofers (?!.*--episodes \d{1,3}\b|.*--episodes 1000\b)")

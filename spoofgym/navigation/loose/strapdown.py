@@ -20,6 +20,7 @@ from spoofgym.navigation.loose import kernels
 from spoofgym.navigation.loose.inertial import InertialBatch
 from spoofgym.navigation.loose.innovation import FilterNoise, FixNoise
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.loose.sweep import Sweep, sweep
 from spoofgym.navigation.loose.warm_start import CONSTANT_BIAS, ERROR, INSTABILITY
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams
@@ -110,6 +111,18 @@ class StrapdownNavigator(InertialBatch):
     def _reset_to_fix(self, runs: Runs, variance: Floats) -> None:
         """Position and, where the receiver gives it, velocity jump to the fix; their correlations are forgotten."""
         kernels.reset(runs, variance, self._noise, self._inertial, self.covariance, self._residual[runs])
+
+    def sweep(self) -> Sweep | None:
+        """Carry a single run, just started, over all epochs of the model, every fix used; None = the filter diverges.
+
+        Innovations equal those of `propagate`, `innovate` and `resolve` in turn. The run is at its end afterwards.
+        """
+        epochs = self.model.num_epochs + 1
+        found = Sweep(empty_innovation(epochs, self.model.dimension), *np.empty((2, epochs, 3)))
+        noise = FixNoise(self._noise.covariance, self._noise.row, np.ones(1))
+        reference, ring = self.model.reference, self.past.ring
+        lasts = sweep(self.model.steps, self._vehicles, ring, reference, noise, self._filters, found)
+        return found if lasts else None
 
     @property
     def fix_gain(self) -> Floats:
