@@ -43,6 +43,7 @@ VIEWS: dict[str, Callable[[Report], list[Section]]] = {
         (
             *("tuning", "thresholds", "fidelity of thresholds", "acna-study", "wrong-shadow", "reproduction"),
             *("recorded-ranges", "references", "self-tuning-study", "patient-spoofer", "agents"),
+            *("delay", "fusion-ripper"),
         ),
         plain_section,
     ),

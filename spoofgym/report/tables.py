@@ -15,7 +15,10 @@ UNTOLD = ("schema_version", "kind", "rows", "complete")
 
 
 def table_of(title: str, summary: str, rows: Sequence[Mapping[str, Any]]) -> TableFigure:
-    """A table of rows with the same keys; intervals become two columns, what is nested is written as JSON."""
+    """A table of rows with the same keys; intervals become two columns, an object one for each of its values.
+
+    Lists are written as JSON.
+    """
     flat = [_flat(row) for row in rows]
     columns = list(dict.fromkeys(name for row in flat for name in row))
     return TableFigure(
@@ -93,6 +96,8 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
             flat |= {f"{name} from": low, f"{name} to": high}
         elif value is None or isinstance(value, str | int | float | bool):
             flat[name] = value
+        elif isinstance(value, Mapping):
+            flat |= {f"{name} {part}": each for part, each in _flat(value).items()}
         else:
             flat[name] = json.dumps(value, ensure_ascii=False)
     return flat

@@ -199,12 +199,13 @@ def test_a_damaged_report_is_refused_in_one_line(kind, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_tables_write_what_is_nested_as_text():
+def test_tables_have_a_column_for_each_value_of_an_object_and_write_lists_as_text():
     report = reports.tuning()
-    report["rows"][0]["extra"] = {"a": [1, 2]}
+    report["rows"][0]["extra"] = {"a": [1, 2, 3], "b": {"c": 5.0}, "ci95": [1.0, 2.0]}
     table = figure(report, TableFigure)
     row = dict(zip(table.columns, table.rows[0], strict=True))
-    assert (row["ci95_m from"], row["ci95_m to"], row["extra"]) == (2.0, 4.0, '{"a": [1, 2]}')
+    assert (row["ci95_m from"], row["ci95_m to"], row["extra a"], row["extra b c"]) == (2.0, 4.0, "[1, 2, 3]", 5.0)
+    assert (row["extra ci95 from"], row["extra ci95 to"]) == (1.0, 2.0)
 
 
 def test_runs_of_one_setting_are_drawn_together():
