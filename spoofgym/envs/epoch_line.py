@@ -17,8 +17,8 @@ def epoch_line(game: OneSeatGame | DuelGame, lane: int) -> str:
         ``  39/230  offset  20.7 m  error   9.3 m  20 back   windowed:n=5 1.42 ALARM``
 
     In order: the epoch and the last one of the game; how far the fix is pulled away, horizontally; the horizontal error
-    of the estimate when last resolved; what became of the fix before; the largest statistic over its threshold; and
-    what is to be known of the present fix.
+    of the estimate when last resolved; how far the vehicle is off its path, where it is steered by its estimate; what
+    became of the fix before; the largest statistic over its threshold; and what is to be known of the present fix.
     """
     simulation = game.simulation
     epoch, last = simulation.epoch, game.scenario.timeline.num_epochs
@@ -28,6 +28,8 @@ def epoch_line(game: OneSeatGame | DuelGame, lane: int) -> str:
         for name, detector in simulation.detectors.items()
     }
     parts = [f"{epoch.index[lane]:>4}/{last:<4}", f"offset {offset:5.1f} m", f"error {error:5.1f} m"]
+    if simulation.steering is not None:
+        parts.append(f"off path {simulation.steering.distance[lane]:5.1f} m")
     parts.append(f"{_fate(game, lane):<8}")
     if ratios:
         largest = max(ratios, key=ratios.__getitem__)

@@ -159,3 +159,17 @@ def test_a_vehicle_that_keeps_its_path_has_no_deviation_to_pay_for(name: str) ->
 def test_an_unknown_objective_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown objective 'errors': did you mean 'error'"):
         spoofer(objective="errors")
+
+
+def test_a_line_of_text_tells_it() -> None:
+    env = spoofer(render_mode="ansi")
+    infos, _, _ = spoofed_game(env)
+    assert f"off path {infos[-1]['deviation']:5.1f} m" in env.render()
+    assert "off path" not in play_line("foi-drive:horizon=16")
+
+
+def play_line(scenario: str) -> str:
+    """The line of the first epoch."""
+    env = spoofer(scenario=scenario, render_mode="ansi")
+    env.reset(seed=3)
+    return str(env.render())
