@@ -14,7 +14,7 @@ import numpy as np
 
 from spoofgym import validation
 
-PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders", "defender")
+PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders", "defender", "aids")
 
 
 class RunStreams:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
 
+AIDS = "aids"
 INERTIAL_SOLUTION = "inertial solution"
 LINEAR_MODEL = "linear model"
 ODOMETER = "odometer"
@@ -30,6 +31,7 @@ class FilterFacts:
         range_model: burn-in -> the model of a filter on ranges (`TightModel`), every range used; None = it takes fixes.
         matched: whether clean innovations before epoch 0 are drawn, white, as of epoch 0; else the filter has really
             been there.
+        aids: what corrects the filter beside GNSS, by name, and the rows of a measurement of each.
     """
 
     scenario: str
@@ -41,6 +43,20 @@ class FilterFacts:
     auxiliary_sigma: float | None = None
     range_model: Callable[[int], object] | None = None
     matched: bool = True
+    aids: tuple[tuple[str, int], ...] = ()
+
+    def refuse_aids(self, owner: str) -> None:
+        """Refuse a part whose equations leave out what aids do between two fixes.
+
+        Args:
+            owner: the part, for the message.
+
+        Raises:
+            ValueError: the filter has aids.
+        """
+        if self.aids:
+            named = ", ".join(name for name, _ in self.aids)
+            raise ValueError(f"{owner} knows no aids, and scenario {self.scenario!r} has: {named}")
 
     def require(self, owner: str, needs: tuple[str, ...], remedy: str = "") -> None:
         """Refuse a part that needs something the scenario does not offer.

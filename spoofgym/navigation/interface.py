@@ -95,6 +95,26 @@ class Innovation:
 
 
 @dataclass(frozen=True)
+class AidInnovations:
+    """What the aids of a filter told it on the way to the present epoch.
+
+    Attributes:
+        names: of the aids.
+        first_row: of each aid among the rows of all.
+        whitened: sum of the whitened innovations of each aid over the root of their number, (N, rows): white, with unit
+            variance, under a matched filter. Zero where an aid did not measure.
+        count: measurements of each aid, those that its gate left out included, (N, A).
+        rejected: those that its gate left out, (N, A).
+    """
+
+    names: tuple[str, ...]
+    first_row: tuple[int, ...]
+    whitened: Floats
+    count: Runs
+    rejected: Runs
+
+
+@dataclass(frozen=True)
 class Epoch(Clock):
     """What one epoch knows; never the truth.
 
@@ -288,6 +308,13 @@ class FixNavigator(Navigator, Protocol):
         """U' for the present fix, (N, m, 15): with the whitened innovation w the fix takes U w off the error."""
 
 
+class AidedNavigator(Navigator, Protocol):
+    """A navigator that aids correct, too."""
+
+    def aid_innovations(self, runs: Runs) -> AidInnovations:
+        """What the aids told these runs on the way to their present epoch."""
+
+
 class RangeNavigator(Navigator, Protocol):
     """A navigator on ranges, which shows monitors more of its filters."""
 
@@ -343,6 +370,11 @@ class FilterView:
             RuntimeError: nobody demanded an unaided solution.
         """
         return self._navigator.auxiliary_offset[self._runs]
+
+    @cached_property
+    def aid_innovations(self) -> AidInnovations:
+        """What the aids told on the way to the present epoch; of a filter with aids."""
+        return cast(AidedNavigator, self._navigator).aid_innovations(self._runs)
 
     @cached_property
     def backtracked(self) -> Runs:

@@ -14,6 +14,8 @@ import math
 from functools import lru_cache
 
 from spoofgym import validation
+from spoofgym.navigation.aids import ON_THE_ROAD, make_aids, spell_aids
+from spoofgym.navigation.loose.aided.family import with_aids
 from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
@@ -64,6 +66,7 @@ def foi_drive(
     process_noise: float = 1.0,
     bias_states: bool = True,
     guidance: str | None = None,
+    aids: str | None = None,
 ) -> Scenario:
     """The drive as a game from 20 s to 250 s.
 
@@ -84,6 +87,9 @@ def foi_drive(
         guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
             with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
             keeps its path whatever it estimates.
+        aids: what corrects the filter beside GNSS: ``barometer``, ``magnetometer``, ``wheel-speed`` and
+            ``zero-velocity``, those that there are joined by ``+``, each with ``/`` in place of the commas between its
+            options; None = nothing.
 
     Raises:
         ValueError: an unknown IMU or receiver, a factor that is not positive, or a game outside the drive.
@@ -95,6 +101,7 @@ def foi_drive(
     validation.one_of(owner, "receiver", receiver, RECEIVERS)
     process_noise = validation.between(owner, "process_noise", process_noise, *NOISE_FACTORS)
     bias_states = validation.boolean(owner, "bias_states", bias_states)
+    sensors = make_aids(owner, aids, ON_THE_ROAD)
     white = receiver == "white"
     sigma = (1.0, 1.0, 1.0) if white else (3.0, 3.0, 3.0)
     name = spell_changed(
@@ -106,6 +113,7 @@ def foi_drive(
         receiver=receiver,
         process_noise=process_noise,
         bias_states=bias_states,
+        aids=spell_aids(sensors),
     )
     fixes = Receiver(
         white_sigma=(1.0, 1.0, 1.0) if white else (0.1, 0.1, 0.1),
@@ -128,7 +136,7 @@ def foi_drive(
         truth=truth, grade=grade(imu), receiver=fixes, tuning=tuning, true_position_random_walk=0.0
     )
     return Scenario(
-        family=family,
+        family=with_aids(family, sensors),
         drag_off_rate=(4.0, 4.0, 4.0),
         error_scale=10.0,
         defender_scale=10.0,

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from spoofgym import validation
+from spoofgym.navigation.aids import IN_THE_AIR, Aid, make_aids, spell_aids
 from spoofgym.navigation.family import COUPLINGS, FilterFamily
+from spoofgym.navigation.loose.aided.family import with_aids
 from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
@@ -84,6 +86,7 @@ def liu_flight(
     horizontal_alert_limit: float = ALERT_LIMITS[0],
     vertical_alert_limit: float = ALERT_LIMITS[1],
     guidance: str | None = None,
+    aids: str | None = None,
 ) -> Scenario:
     """The Liu flight: aviation-grade INS and a single-frequency GPS receiver.
 
@@ -112,6 +115,8 @@ def liu_flight(
         guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
             with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
             keeps its path whatever it estimates.
+        aids: what corrects the filter beside GNSS: ``barometer``, ``magnetometer``, or both joined by ``+``, each with
+            ``/`` in place of the commas between its options; None = nothing.
 
     Raises:
         ValueError: an unknown name, a number out of range, a game outside the flight, or options that do not go
@@ -129,6 +134,7 @@ def liu_flight(
     markov_time = validation.zero_or_above(owner, "markov_time", markov_time)
     usual = DRAG_OFF_RATES[coupling]
     rules = flight_rules(owner, drag_off_rate, usual, horizontal_alert_limit, vertical_alert_limit)
+    sensors = make_aids(owner, aids, IN_THE_AIR)
     coloured = markov_sigma != 0.0 or markov_time != 0.0
     if coloured and not (markov_sigma and markov_time):
         raise ValueError(
@@ -150,13 +156,16 @@ def liu_flight(
         drag_off_rate=None if rules.fastest == usual else rules.fastest,
         horizontal_alert_limit=rules.alert_limits[0],
         vertical_alert_limit=rules.alert_limits[1],
+        aids=spell_aids(sensors),
     )
     if coupling == "tight" and (noise != "white" or coloured or sigma != 3.7):
         raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
+    if coupling == "tight" and sensors:
+        raise ValueError(f"{owner}: aids go with coupling=loose; the filter that takes ranges has none yet")
     if noise == "ranges" and coloured:
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
     truth = SimulatedTruth(name=name, trajectory=_trajectory(), rate=rate, onset=onset, horizon=horizon)
-    fixes = _Fixes(sigma, markov_sigma, markov_time, noise)
+    fixes = _Fixes(sigma, markov_sigma, markov_time, noise, sensors)
     return rules.scenario(FAMILIES[coupling](truth, imu, fixes)).guided(guidance, "horizontal")
 
 
@@ -168,6 +177,7 @@ class _Fixes:
     markov_sigma: float
     markov_time: float
     noise: str
+    aids: tuple[Aid, ...]
 
 
 def _loose(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> LooseFamily:
@@ -183,7 +193,7 @@ def _loose(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> LooseFamily:
     if fixes.noise == "ranges":
         receiver = Receiver(rate=truth.rate, white_sigma=ZERO)
         ranges = range_fix_along(LIU, gps_24(), truth.trajectory, truth.rate)
-    return LooseFamily(
+    family = LooseFamily(
         truth=truth,
         grade=grade(imu),
         receiver=receiver,
@@ -191,6 +201,7 @@ def _loose(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> LooseFamily:
         true_position_random_walk=FilterTuning().position_random_walk,
         ranges=ranges,
     )
+    return with_aids(family, fixes.aids)
 
 
 def _tight(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> TightFamily:

@@ -148,6 +148,12 @@ class LooseFamily(FixFamily):
         Raises:
             ValueError: the trajectory does not reach back that far.
         """
+        before = self._before(burn_in)
+        start = cold_start(self.grade, self.receiver, self.tuning, self.ranges)
+        return warm_up(start, self.epochs(0, before), self.grade, self.receiver, self.tuning, self.ranges)
+
+    def _before(self, burn_in: int) -> int:
+        """Epochs of the trajectory before epoch -burn_in; raises as `warm_start`."""
         before = self.truth.first(burn_in)
         if before < 0:
             raise ValueError(
@@ -155,8 +161,7 @@ class LooseFamily(FixFamily):
                 f"reaches before the trajectory, which has {before + burn_in} before the game: take detectors with a "
                 "shorter memory, or a later onset where there is one"
             )
-        start = cold_start(self.grade, self.receiver, self.tuning, self.ranges)
-        return warm_up(start, self.epochs(0, before), self.grade, self.receiver, self.tuning, self.ranges)
+        return before
 
     @kept_by_burn_in
     def linear_model(self, burn_in: int = 0) -> LinearModel:

@@ -84,6 +84,29 @@ def expected_sequence(model: LinearModel, offsets: Floats) -> tuple[Floats, Floa
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _predict(columns: Floats, noise: Floats, error: Floats, work: Floats) -> None:
+    """x <- Φ x, for the first nine rows of Φ, stored by columns, or for all of them; noise zero, work (n,)."""
+    if columns.shape[1] == NUM_NAVIGATION:
+        kalman.predict_error(columns, noise, error, work)
+    else:
+        _predict_all(columns, error, work)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _predict_all(columns: Floats, error: Floats, work: Floats) -> None:
+    """x <- Φ x, for a Φ stored by columns, (n, n); x and work (n,)."""
+    n = error.shape[0]
+    for i in range(n):
+        work[i] = 0.0
+    for j in range(n):
+        factor = error[j]
+        for i in range(n):
+            work[i] += columns[j, i] * factor
+    for i in range(n):
+        error[i] = work[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _observe(
     observation: Floats, error: Floats, offset: Floats, previous: Floats, interval: float, residual: Floats
 ) -> None:
@@ -112,7 +135,7 @@ def _advance(
     columns, observation, factor, gain = model
     prior, error, whitened, coming = means
     n = prior.shape[1]
-    residual, noise, work = np.empty(observation.shape[1]), np.zeros(n), np.empty(NUM_NAVIGATION)
+    residual, noise, work = np.empty(observation.shape[1]), np.zeros(n), np.empty(n)
     last = columns.shape[0] - 1
     for run in runs:
         k = index[run]
@@ -125,7 +148,7 @@ def _advance(
         if k < last:
             for i in range(n):
                 prior[run, i] = error[run, i]
-            kalman.predict_error(columns[k + 1], noise, prior[run], work)
+            _predict(columns[k + 1], noise, prior[run], work)
             _observe(observation[k + 1], prior[run], offset[run], offset[run], interval[run], residual)
             kalman.whiten(factor[k + 1], residual, coming[run])
 
@@ -142,10 +165,10 @@ def _sequence(offsets: Floats, intervals: Floats, model: MeanModel, whitened: Fl
         error: e, (n,), in place.
     """
     columns, observation, factor, gain = model
-    residual, noise, work = np.empty(observation.shape[1]), np.zeros(error.shape[0]), np.empty(NUM_NAVIGATION)
+    residual, noise, work = np.empty(observation.shape[1]), np.zeros(error.shape[0]), np.empty(error.shape[0])
     previous = np.zeros(3)
     for k in range(1, len(offsets) + 1):
-        kalman.predict_error(columns[k], noise, error, work)
+        _predict(columns[k], noise, error, work)
         _observe(observation[k], error, offsets[k - 1], previous, intervals[k - 1], residual)
         kalman.whiten(factor[k], residual, whitened[k - 1])
         kalman.correct_error(gain[k], whitened[k - 1], error)
