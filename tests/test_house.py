@@ -18,7 +18,7 @@ ROOMS = (
     *("cli", "__main__"),
 )
 """In the order of docs/inside/architecture.md. What is not named is the ground floor, which knows no room."""
-FILTERS = ("loose", "tight", "credible", "separation")
+FILTERS = ("aids", "loose", "tight", "credible", "separation")
 """In order, too: a filter may use those before it."""
 LEARNERS = ("torch", "stable_baselines3", "tensorboard")
 TAKE_LEARNERS = ("learning", "envs/sb3.py")

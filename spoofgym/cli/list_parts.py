@@ -1,4 +1,4 @@
-"""List what there is to play with: scenarios, detectors, attacks, responses, policies.
+"""List what there is to play with: scenarios, detectors, attacks, responses, aids, policies.
 
     spoofgym list
     spoofgym list detectors
@@ -42,8 +42,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     result = Parser(
         prog="spoofgym list",
-        description="List scenarios, detectors, attacks, responses and policies, a line each; of one name its options "
-        "with defaults and units, its source, and an example.",
+        description="List scenarios, detectors, attacks, responses, aids and policies, a line each; of one name its "
+        "options with defaults and units, its source, and an example.",
         examples=EXAMPLES,
     )
     add = result.add_argument

@@ -1,4 +1,4 @@
-"""What there is to play with, as its own documentation tells it: scenarios, detectors, attacks, responses, policies.
+"""What there is to play with, as its own documentation tells it: scenarios, aids, detectors, attacks, responses.
 
 Nothing is written twice: what a part does and where it comes from stands in the docstring of its class or function, its
 options and their defaults in its signature.
@@ -17,6 +17,7 @@ from typing import Any
 from spoofgym.attacks import ATTACKS
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.envs.opponents import FITTED, make_spoofer
+from spoofgym.navigation.aids import AIDS
 from spoofgym.responses import RESPONSES, make_response
 from spoofgym.scenarios import SCENARIOS, make_scenario
 from spoofgym.specification import unknown_name, write
@@ -26,6 +27,7 @@ REGISTRIES: dict[str, Mapping[str, Callable[..., Any]]] = {
     "detectors": DETECTORS,
     "attacks": ChainMap(FITTED, ATTACKS),  # a view: attacks of one's own are registered later
     "responses": RESPONSES,
+    "aids": AIDS,
 }
 GIVEN = {
     "ramp": "ramp:0.5",
@@ -44,9 +46,9 @@ GIVEN = {
     "recorded": "recorded:FOLDER",
 }
 """Examples of parts that are spelled with a value."""
-PLACES = ("foi-drive", "liu-flight", "kujur-flight", "song-robot")
+PLACES = ("foi-drive", "liu-flight", "kujur-flight", "song-robot", "foi-drive:aids=wheel-speed+barometer")
 """Where an example is played: the first that offers what the part needs."""
-UNITS = r"m/s²|m/s|m²|deg/h|deg/s|degrees|deg|rad|µg|Hz|m|s|epochs|fixes|standard deviations"
+UNITS = r"m/s²|m/√s|m/s|deg/√s|m²|deg/h|deg/s|degrees|deg|rad|µg|Hz|m|s|epochs|fixes|standard deviations"
 UNIT = re.compile(rf"(?:^|, )({UNITS})(?=[,;:.]|$)|^(epochs)\b")
 """Where a description names the unit of its value: "radius of the circle, m; ..."."""
 UNTOLD = "It has no docstring that would tell what it is"
@@ -79,7 +81,7 @@ class Part:
     """What a part's documentation says.
 
     Attributes:
-        kind: "scenarios", "detectors", "attacks" or "responses".
+        kind: "scenarios", "detectors", "attacks", "responses" or "aids".
         name: registered.
         told: the first sentence.
         text: paragraphs that follow.
@@ -107,6 +109,8 @@ class Part:
     def _played(self) -> str:
         if self.kind == "scenarios":
             return f"spoofgym play --scenario {self.example}"
+        if self.kind == "aids":
+            return f"spoofgym play --scenario foi-drive:aids={self.example}"
         try:
             place = next((text for text in PLACES if self._fits(text)), PLACES[0])
         except ValueError:  # one's own part that is spelled with a value which nobody can guess

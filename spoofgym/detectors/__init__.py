@@ -10,6 +10,7 @@ from dataclasses import replace
 from spoofgym import validation
 from spoofgym.detectors.acceleration import Acceleration
 from spoofgym.detectors.acna import Acna
+from spoofgym.detectors.aid_innovation import AidInnovation
 from spoofgym.detectors.aime import Aime
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.bias_range import BiasRange
@@ -102,6 +103,7 @@ DETECTORS: dict[str, Callable[..., Detector]] = {
     "ci": _cumulative_innovation,
     "cpi": Cpi,
     "raim": Raim,
+    "aid-innovation": AidInnovation,
     "ensemble": _ensemble,
 }
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs, read_only
+from spoofgym.navigation.aid_innovations import AidInnovations
 from spoofgym.navigation.position_domain import project_onto_position, whitened_axes
 from spoofgym.streams import RunStreams
 
@@ -92,26 +93,6 @@ class Innovation:
         residual, covariance, whitened, nis = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((n, 3)), np.empty(n)
         project_onto_position(read_only(self.range_response), self.whitened, residual, covariance, whitened, nis)
         return Innovation(residual, covariance, whitened, nis)
-
-
-@dataclass(frozen=True)
-class AidInnovations:
-    """What the aids of a filter told it on the way to the present epoch.
-
-    Attributes:
-        names: of the aids.
-        first_row: of each aid among the rows of all.
-        whitened: sum of the whitened innovations of each aid over the root of their number, (N, rows): white, with unit
-            variance, under a matched filter. Zero where an aid did not measure.
-        count: measurements of each aid, those that its gate left out included, (N, A).
-        rejected: those that its gate left out, (N, A).
-    """
-
-    names: tuple[str, ...]
-    first_row: tuple[int, ...]
-    whitened: Floats
-    count: Runs
-    rejected: Runs
 
 
 @dataclass(frozen=True)

@@ -105,9 +105,10 @@ class MultipleHypothesis(Response):
         """Learn the filter's model, of which every hypothesis runs a copy.
 
         Raises:
-            ValueError: pulls would begin, turn or end in every other epoch, or the fixes are not a position alone and
-                pulls may be hidden.
+            ValueError: the filter has aids, which the hypotheses do not know, pulls would begin, turn or end in every
+                other epoch, or the fixes are not a position alone and pulls may be hidden.
         """
+        facts.refuse_aids(f"response {self.name!r}")
         model, interval = facts.model(0), facts.interval
         self._kinds = self._pulls(interval)
         self._model = bank_model(model, self._kinds, self.multipath)

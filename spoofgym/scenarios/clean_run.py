@@ -14,6 +14,7 @@ from spoofgym.kernels import njit
 from spoofgym.mechanization import mechanize
 from spoofgym.navigation.divergence import FilterDivergedError, diverged_error
 from spoofgym.navigation.interface import Decision
+from spoofgym.navigation.loose.aided.strapdown import AidedStrapdownNavigator
 from spoofgym.navigation.loose.inertial import InertialBatch
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
@@ -89,6 +90,17 @@ class TightCleanRun(CleanRun):
     state: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class AidedCleanRun(CleanRun):
+    """That of a filter with aids, with its P of all states, (E + 1, n, n).
+
+    Attributes:
+        state: what the filter estimates of the states of the aids, (E + 1, a).
+    """
+
+    state: Floats
+
+
 def clean_run(model: StrapdownModel) -> CleanRun:
     """Run the filter over all epochs of a model, every fix used.
 
@@ -97,6 +109,17 @@ def clean_run(model: StrapdownModel) -> CleanRun:
     """
     navigator = StrapdownNavigator(model, 1, RunSlices(1))
     return CleanRun(*_states(navigator, np.zeros(NUM_JOINT), np.zeros((len(model.time), model.dimension))))
+
+
+def aided_clean_run(navigator: AidedStrapdownNavigator) -> AidedCleanRun:
+    """Run a filter with aids over all epochs of a navigator of one run, every fix used.
+
+    Raises:
+        CleanRunDivergedError: the filter diverges.
+    """
+    model, state = navigator.model, navigator.aid_error
+    deviation = np.zeros((len(model.time), model.dimension))
+    return AidedCleanRun(*_states(navigator, np.zeros(NUM_JOINT + state.shape[1]), deviation, lambda: state))
 
 
 def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> TightCleanRun:

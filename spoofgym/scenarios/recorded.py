@@ -28,10 +28,13 @@ from spoofgym.logs.log_warning import warn
 from spoofgym.logs.range_epochs import range_epochs
 from spoofgym.logs.range_fixes import range_fixes
 from spoofgym.logs.reference import checked_reference
+from spoofgym.navigation.aids import Aid, make_aids, spell_aids
 from spoofgym.navigation.family import COUPLINGS
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.limits import NOISE_FACTORS
+from spoofgym.scenarios.log_aids import read_aid
+from spoofgym.scenarios.recorded_aided import RecordedAided
 from spoofgym.scenarios.recorded_loose import SIGMA_FLOOR, RecordedFixes
 from spoofgym.scenarios.recorded_tight import RecordedRanges
 from spoofgym.sensors.imu import grade as imu_grade
@@ -64,6 +67,7 @@ def recorded(
     least_speed: float | None = None,
     guidance: str | None = None,
     noise: str | None = None,
+    aids: str | None = None,
 ) -> Scenario:
     """A log in the project's format as a game.
 
@@ -87,6 +91,9 @@ def recorded(
             keeps its path whatever it estimates.
         noise: what the filter believes in place of grade, noise_factor and sigma_floor: ``estimated``, the file
             ``noise.toml`` of the log, which ``spoofgym estimate-noise`` writes, or another such file; None = nothing.
+        aids: what corrects the filter beside GNSS, from the log's own tables: ``barometer``, ``magnetometer``,
+            ``wheel-speed`` and ``zero-velocity``, those that there are joined by ``+``, each with ``/`` in place of the
+            commas between its options; None = nothing.
 
     Raises:
         ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
@@ -114,6 +121,9 @@ def recorded(
     if noise is not None and (noise_factor != NOISE_FACTOR or sigma_floor != SIGMA_FLOOR or coupling == "tight"):
         raise ValueError("recorded: noise takes the place of noise_factor and sigma_floor, and needs coupling=loose")
     believed = None if noise is None else read_noise(noise_file(path, noise))
+    sensors = make_aids("recorded", aids)
+    if coupling == "tight" and sensors:
+        raise ValueError("recorded: aids go with coupling=loose; the filter that takes ranges has none yet")
     options = {
         "grade": (grade, "automotive"),
         "onset": (None if onset is None else np.format_float_positional(onset, trim="-"), None),
@@ -126,6 +136,7 @@ def recorded(
         "alignment": (alignment, None),
         "least_speed": (least_speed, None),
         "noise": (noise, None),
+        "aids": (spell_aids(sensors), None),
     }
     name = spell("recorded", path, **{key: value for key, (value, default) in options.items() if value != default})
     tuning = FilterTuning(
@@ -136,7 +147,7 @@ def recorded(
         process_noise_scale=noise_factor**2,
         measurement_sigma=DEFAULT_SIGMA,
     )
-    asked = _Fixes(fixes, velocity, sigma_floor, believed)
+    asked = _Fixes(fixes, velocity, sigma_floor, believed, sensors)
     common = {"name": name, "grade": imu, "tuning": tuning, "onset": onset, "horizon": horizon}
     common |= {"aligned": alignment, "least_speed": least_speed}
     log = checked_log(path)
@@ -160,6 +171,7 @@ class _Fixes:
     velocity: bool | None
     sigma_floor: float
     noise: LogNoise | None
+    aids: tuple[Aid, ...]
 
 
 def _loose(log: Log, asked: _Fixes, *, tuning: FilterTuning, **common: Any) -> RecordedFixes:
@@ -169,7 +181,13 @@ def _loose(log: Log, asked: _Fixes, *, tuning: FilterTuning, **common: Any) -> R
     log = with_velocity_at_imu(checked_reference(log))
     if asked.velocity is False or (asked.velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
-    return RecordedFixes(log=log, tuning=tuning, sigma_floor=asked.sigma_floor, noise=asked.noise, **common)
+    common |= {"log": log, "tuning": tuning, "sigma_floor": asked.sigma_floor, "noise": asked.noise}
+    if not asked.aids:
+        return RecordedFixes(**common)
+    found = [read_aid(log, aid) for aid in asked.aids]
+    return RecordedAided(
+        aids=tuple(aid for aid, _ in found), readings=tuple(readings for _, readings in found), **common
+    )
 
 
 def _tight(log: Log, asked: _Fixes, **common: Any) -> RecordedRanges:

@@ -207,6 +207,18 @@ class RecordedFamily(Immutable, ABC):
         """Position (0) or velocity (1) of the reference, and something else, (E, 3), where it does not know it."""
         return otherwise if self._truth is None else np.where(self.compared[:, None], self._truth[truth], otherwise)
 
+    @property
+    def cuts(self) -> Floats:
+        """Times at which a step of the inertial samples must end, beside those of the epochs, s: none by default."""
+        return np.zeros(0)
+
+    @cached_property
+    def grid(self) -> Floats:
+        """Ends of the steps of the inertial samples, from the alignment to the last epoch, s."""
+        log, time = self.log, self.epoch_time
+        inside = (log.imu_time > self.align_time) & (log.imu_time < time[-1])
+        return np.union1d(np.concatenate([log.imu_time[inside], self.cuts]), np.concatenate([[self.align_time], time]))
+
     def _inertial_model(self, position: Floats, velocity: Floats, covariance: Floats) -> StrapdownModel:
         """The samples of all epochs after the alignment, as straight lines cut so that a step ends at each epoch.
 
@@ -215,10 +227,7 @@ class RecordedFamily(Immutable, ABC):
             velocity: of the fixes, and of the truth where no reference tells it, (E, 3), ENU, m/s.
             covariance: the filter's R of fixes, (E, m, m).
         """
-        log, time = self.log, self.epoch_time
-        ends = np.concatenate([[self.align_time], time])
-        inside = (log.imu_time > self.align_time) & (log.imu_time < time[-1])
-        grid = np.union1d(log.imu_time[inside], ends)
+        log, time, grid = self.log, self.epoch_time, self.grid
 
         def means(samples: Floats) -> Floats:
             """Of straight lines between the samples, over each step of the grid."""
@@ -230,7 +239,7 @@ class RecordedFamily(Immutable, ABC):
             angular_rate=means(log.angular_rate),
             specific_force=means(log.specific_force),
             step=np.diff(grid),
-            boundaries=np.searchsorted(grid, ends).astype(np.int64),
+            boundaries=np.searchsorted(grid, np.concatenate([[self.align_time], time])).astype(np.int64),
             fix_position=position,
             fix_velocity=velocity,
             true_position=self._known(0, position),

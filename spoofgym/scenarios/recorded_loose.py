@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class RecordedFixes(RecordedFamily, FixFamily):
             ``sigma_floor``; None = there are none.
     """
 
-    offers = (INERTIAL_SOLUTION,)
+    offers: ClassVar[tuple[str, ...]] = (INERTIAL_SOLUTION,)
 
     sigma_floor: float = SIGMA_FLOOR
     noise: LogNoise | None = None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym import validation
+from spoofgym.navigation.aids import make_aids
+from spoofgym.navigation.loose.aided.family import with_aids
 from spoofgym.navigation.loose.family import LooseFamily
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import Scenario
@@ -26,6 +28,7 @@ def simulated(
     tuning: FilterTuning | None = None,
     drag_off_rate: float = 4.0,
     error_scale: float = 10.0,
+    aids: str | None = None,
 ) -> Scenario:
     """A scenario with a loosely coupled filter on a trajectory of one's own.
 
@@ -42,6 +45,7 @@ def simulated(
         tuning: what the filter believes; None = `matched_tuning` of the receiver.
         drag_off_rate: the largest rate at which a spoofer moves the position along each axis, m/s.
         error_scale: metres of navigation error that make a spoofer's reward of 1.
+        aids: what corrects the filter beside GNSS, e.g. ``barometer+wheel-speed:rate=10``; None = nothing.
 
     Raises:
         ValueError: naming what does not fit: an unknown grade, a receiver whose rate does not divide that of the
@@ -59,6 +63,7 @@ def simulated(
     validation.instance(owner, "receiver", fixes, Receiver, "a Receiver")
     believed = matched_tuning(fixes) if tuning is None else tuning
     rate = validation.above(owner, "drag_off_rate", drag_off_rate)
+    sensors = make_aids(owner, aids)
     family = LooseFamily(
         truth=SimulatedTruth(name=name, trajectory=trajectory, rate=fixes.rate, onset=onset, horizon=horizon),
         grade=imu,
@@ -66,7 +71,7 @@ def simulated(
         tuning=believed,
         true_position_random_walk=believed.position_random_walk,
     )
-    return Scenario(family=family, drag_off_rate=(rate, rate, rate), error_scale=error_scale)
+    return Scenario(family=with_aids(family, sensors), drag_off_rate=(rate, rate, rate), error_scale=error_scale)
 
 
 def matched_tuning(receiver: Receiver) -> FilterTuning:

@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from functools import partial
 
 import pytest
 
@@ -12,12 +13,14 @@ from spoofgym.cli.list_parts import KINDS, main, table
 from spoofgym.cli.parts import REGISTRIES, parts
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
+from spoofgym.navigation.aids import make_aids
 from spoofgym.policies import published
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
 from tests.run_folders import spoofer
 
 MAKE = {"scenarios": make_scenario, "detectors": make_detector, "attacks": make_spoofer, "responses": make_response}
+MAKE["aids"] = partial(make_aids, "test")
 
 
 @pytest.mark.parametrize("kind", REGISTRIES)

@@ -18,7 +18,7 @@ class Barometer(Aid):
 
     It reads h + b + white noise. The offset b holds all that is slow: the pressure at sea level, the geoid, the
     temperature of the air. It is a random walk, so that GNSS teaches it slowly and a pull of the height that is slower
-    than the walk stays hidden. The figures are ours.
+    than the walk stays hidden. Groves 2013, section 6.2.1, tells what it errs by; the figures are ours.
 
     Args:
         sigma: of the white noise, m.

@@ -16,12 +16,12 @@ class Told(NamedTuple):
 
     Attributes:
         whitened: sum of the whitened innovations, (N, rows).
-        count: measurements of each aid, those that were left out included, (N, A).
+        number: measurements of each aid, those that were left out included, (N, A).
         rejected: those that were left out, (N, A).
     """
 
     whitened: Floats
-    count: Runs
+    number: Runs
     rejected: Runs
 
 
@@ -72,7 +72,7 @@ def tell(run: int, aid: int, row: int, whitened: Floats, used: bool, told: Told)
     """Keep the whitened innovation (r,) of an aid whose rows begin at ``row``, and whether it was used."""
     for a in range(len(whitened)):
         told.whitened[run, row + a] += whitened[a]
-    told.count[run, aid] += 1
+    told.number[run, aid] += 1
     if not used:
         told.rejected[run, aid] += 1
 
@@ -82,8 +82,8 @@ def forget(run: int, told: Told) -> None:
     """Begin an epoch of a run."""
     for a in range(told.whitened.shape[1]):
         told.whitened[run, a] = 0.0
-    for j in range(told.count.shape[1]):
-        told.count[run, j] = 0
+    for j in range(told.number.shape[1]):
+        told.number[run, j] = 0
         told.rejected[run, j] = 0
 
 

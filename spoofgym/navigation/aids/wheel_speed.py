@@ -21,7 +21,7 @@ class WheelSpeed(Aid):
     Three constant errors are states: the scale of the wheels, and yaw and pitch of the IMU in the vehicle, by which a
     part of the speed seems to go sideways. The constraints hold where the IMU sits: near the rear axle they do, ahead
     of it a car in a turn moves sideways. That is part of ``lateral``, and it is slow, which is why a reading a second
-    is usual, although wheels tell more. The figures are ours.
+    is usual, although wheels tell more. Groves 2013, chapter 15, has the constraints; the figures are ours.
 
     Args:
         sigma: of the forward speed, m/s.

@@ -17,7 +17,8 @@ class ZeroVelocity(Aid):
     """The velocity while the vehicle stands: zero (a zero-velocity update).
 
     In a simulation it stands where its true speed is 0.05 m/s or less. In a log that is told by the inertial samples
-    alone (`spoofgym.scenarios.log_aids`). It has no states. The figures are ours.
+    alone (`spoofgym.scenarios.log_aids`). It has no states. Groves 2013, chapter 15, has the update; the
+    figures are ours.
 
     Args:
         sigma: of the velocity at a standstill per axis, m/s.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class LooseFamily(FixFamily):
     ranges: RangeFix | None = None
 
     fidelities = FIDELITIES
-    offers = (INERTIAL_SOLUTION, LINEAR_MODEL)
+    offers: ClassVar[tuple[str, ...]] = (INERTIAL_SOLUTION, LINEAR_MODEL)
     random = True
 
     def __post_init__(self) -> None:

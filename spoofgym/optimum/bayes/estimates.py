@@ -98,8 +98,8 @@ class Bayesian:
         resolution: of the attacks.
 
     Raises:
-        ValueError: the scenario does not take such fixes, the game is too short for an attack, or a population that is
-            unknown.
+        ValueError: the scenario does not take such fixes or has aids, the game is too short for an attack, or a
+            population that is unknown.
     """
 
     scenario: Scenario
@@ -114,6 +114,7 @@ class Bayesian:
                 f"{OWNER}: scenario {self.scenario.name!r} has {family.measurement}; it exists for a simulated motion "
                 "with fixes of position alone (m = 3)"
             )
+        family.facts.refuse_aids(OWNER)
         if timeline.end - timeline.start < LEAST_LEFT + timeline.interval:
             raise ValueError(f"{OWNER}: an attack needs a game of more than {LEAST_LEFT:g} s")
         share = validation.share(OWNER, "clean", self.clean)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from spoofgym.arrays import Floats, Runs
+from spoofgym.navigation.aid_innovations import AidInnovations
 from spoofgym.navigation.aids.aid_set import AidSet
 from spoofgym.navigation.aids.kernels import Told
 from spoofgym.navigation.batch import FilterBatch
-from spoofgym.navigation.interface import AidInnovations, Demands
+from spoofgym.navigation.interface import Demands
 from spoofgym.streams import RunStreams
 
 
@@ -42,6 +43,7 @@ class AidedBatch(FilterBatch):
 
     def aid_innovations(self, runs: Runs) -> AidInnovations:
         """What the aids told these runs on the way to their present epoch."""
-        whitened, count, rejected = (part[runs] for part in self._told)
+        told, count = self._told, self._told.number[runs]
         rows = np.repeat(np.maximum(count, 1), [aid.dimension for aid in self.aids.aids], axis=1)
-        return AidInnovations(self.aids.names, self.aids.first_row, whitened / np.sqrt(rows), count, rejected)
+        whitened = told.whitened[runs] / np.sqrt(rows)
+        return AidInnovations(self.aids.names, self.aids.first_row, whitened, count, told.rejected[runs])

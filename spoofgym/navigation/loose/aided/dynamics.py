@@ -36,8 +36,6 @@ def steps_per_epoch(owner: str, aids: tuple[Aid, ...], receiver: Receiver, imu_r
             )
     if not _whole(imu_rate / fastest):
         raise ValueError(f"{owner}: aids: {fastest:g} Hz must divide the IMU's {imu_rate:g} Hz into whole samples")
-    if not _whole(fastest / receiver.rate):
-        raise ValueError(f"{owner}: aids: {fastest:g} Hz must be a whole multiple of the receiver's rate")
     return round(fastest / receiver.rate)
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION
 from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.loose.aided.batch import AidedBatch
 from spoofgym.navigation.loose.aided.kernels import AidedErrors
 from spoofgym.navigation.loose.aided.model import AidedModel
-from spoofgym.navigation.loose.aided.batch import AidedBatch
 from spoofgym.navigation.loose.dynamics import ErrorBatch
 from spoofgym.parallel import RunSlices
 from spoofgym.sensors.imu import ImuGrade
@@ -55,7 +55,7 @@ class AidedErrorBatch(AidedBatch, ErrorBatch):
         )
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
-        """Start new episodes just before epoch 0; the last columns of ``initial`` are the errors of the aids' states."""
+        """Start new episodes just before epoch 0; the last columns of ``initial`` are of the aids' states."""
         super().reset(runs, initial, streams)
         own = self.state.shape[1] - NUM_INERTIAL
         self.state[runs, NUM_INERTIAL:] = initial[:, initial.shape[1] - own :]

@@ -153,7 +153,7 @@ class AidedFilter:
         form(self.covariance, observation, variance, cross, factor, gain)
         kalman.update_covariance(gain, self.covariance)
         gains.factor[number, :rows, :rows], gains.gain[number, :rows] = factor, gain
-        kalman_gain = np.linalg.solve(factor.T, gain).T
+        kalman_gain = np.asarray(np.linalg.solve(factor.T, gain).T, np.float64)
         self.closed = self.closed - kalman_gain @ (observation @ self.closed)
         return observation, kalman_gain, variance
 

@@ -67,7 +67,7 @@ class AidedStrapdownNavigator(AidedBatch, StrapdownNavigator):
         self.past.add(aid_error=self.aid_error)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
-        """Start new episodes just before epoch 0; the last columns of ``initial`` are the errors of the aids' states."""
+        """Start new episodes just before epoch 0; the last columns of ``initial`` are of the aids' states."""
         super().reset(runs, initial, streams)
         self.aid_error[runs] = initial[:, initial.shape[1] - self.aid_error.shape[1] :]
         self._draw_aids(runs, streams)

@@ -81,7 +81,8 @@ def aided_warm_up(
         observed = np.zeros((m, size))
         observed[:, :NUM_NAVIGATION] = dynamics.observation[k]
         observed[range(3), range(COLOUR.start, COLOUR.stop)] = -1.0
-        joint = _corrected(joint, error, observed, np.linalg.solve(factor.T, gain).T, white)
+        fix_gain = np.asarray(np.linalg.solve(factor.T, gain).T, np.float64)
+        joint = _corrected(joint, error, observed, fix_gain, white)
     return WarmStart(state.covariance, joint, semidefinite_factor(joint))
 
 
