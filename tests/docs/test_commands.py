@@ -21,7 +21,7 @@ TRAINS = "it trains"
 ONLY_PARSED = {
     **dict.fromkeys(("train spoofer", "train defender", "train league", "exploit"), TRAINS),
     **dict.fromkeys(("benchmark", "bound bayes", "bound duel", "integrity", "matrix", "thresholds"), MINUTES),
-    **dict.fromkeys(("reproduce", "study acna", "study self-tuning", "study patient-spoofer"), MINUTES),
+    **dict.fromkeys(("reproduce", "study acna", "study aids", "study self-tuning", "study patient-spoofer"), MINUTES),
     **dict.fromkeys(("study fidelity-of-thresholds", "study recorded-ranges", "study delay"), MINUTES),
     **dict.fromkeys(("evaluate defenders",), MINUTES),
     "study noise": MINUTES,

@@ -32,6 +32,8 @@ SCENARIOS = {
     "shadmehri-tuned": "shadmehri-flight:self-tuning,onset=27",
     "kujur": TIGHT,
     "song": ROBOT,
+    "liu-aided": f"{LOOSE},aids=barometer+magnetometer:rate=2",
+    "foi-aided": "foi-drive:horizon=24,aids=wheel-speed:gate=0.01+zero-velocity",
 }
 GUIDED = ("first-order:2", "second-order:2/axes=horizontal")
 HISTORY = 6

@@ -17,8 +17,8 @@ class Magnetometer(Aid):
 
     It reads the field's direction in body axes. Turned by the filter's attitude, the field has an azimuth, which is the
     declination where the attitude is right. An error of the heading turns it one to one; one of roll or pitch turns it,
-    too, the more the steeper the field. A constant error (declination, iron in the vehicle) is a state (Groves 2013,
-    section 6.1.1). The figures are ours.
+    too, the more the steeper the field. A constant error of the declination (or iron in the vehicle) is a state (Groves
+    2013, section 6.1.1). The figures are ours.
 
     Args:
         sigma: of the white noise of the azimuth, degrees.
@@ -70,14 +70,14 @@ class Magnetometer(Aid):
         return np.asarray((apart + np.pi) % (2.0 * np.pi) - np.pi)[:, None]
 
     def observe(self, place: Place, reading: Floats) -> Floats:
-        """With the field (e, n, u): d azimuth = φ_U - u (e φ_E + n φ_N) / (e² + n²), (n, 1, 10)."""
+        """With the field (e, n, u): φ_U - u (e φ_E + n φ_N) / (e² + n²) - constant error, (n, 1, 10)."""
         east, north, up = _turned(place, reading)
         level = np.maximum(east**2 + north**2, 1e-12 * (up**2 + 1e-30))
         observation = np.zeros((len(reading), 1, NUM_NAVIGATION + 1))
         observation[:, 0, 0] = -up * east / level
         observation[:, 0, 1] = -up * north / level
         observation[:, 0, 2] = 1.0
-        observation[:, 0, NUM_NAVIGATION] = 1.0
+        observation[:, 0, NUM_NAVIGATION] = -1.0
         return observation
 
 
