@@ -38,7 +38,7 @@ LACKING = {
         **dict.fromkeys(("benchmark attack", "benchmark defend", "benchmark table", "benchmark references"), WORKERS),
         "bound bayes": WORKERS,
         **dict.fromkeys(("play", "evaluate recorded", "study recorded-ranges"), ONE_RUN),
-        **dict.fromkeys(("thresholds", "bound duel", "export", "agents", "reproduce"), SERIAL),
+        **dict.fromkeys(("thresholds", "bound duel", "export", "agents", "reproduce", "study aids"), SERIAL),
     },
     "--import": {
         **dict.fromkeys(("report", "check", "import", "check-log", "reproduce"), NO_PARTS),
