@@ -149,6 +149,12 @@ def interpolate(solution: Fixes, time: Floats) -> tuple[Floats, Floats]:
     return displace(origin, spline(time)), spline(time, 1)
 
 
+def step_means(time: Floats, samples: Floats, grid: Floats) -> Floats:
+    """Means of straight lines between samples (n, 3) at their times over each step of a grid (k,), (k - 1, 3)."""
+    at = np.column_stack([np.interp(grid, time, samples[:, a]) for a in range(3)])
+    return np.asarray(0.5 * (at[1:] + at[:-1]))
+
+
 @dataclass(frozen=True, eq=False)
 class Tables:
     """The files of a log as they are: each value is in its limits and times increase, and nothing more is known.

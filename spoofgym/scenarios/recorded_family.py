@@ -15,7 +15,7 @@ from spoofgym.geodesy import displace, position_difference
 from spoofgym.immutable import Immutable
 from spoofgym.logs.alignment import Alignment, align
 from spoofgym.logs.imu_gaps import refuse_gaps
-from spoofgym.logs.log import Log, covered, interpolate
+from spoofgym.logs.log import Log, covered, interpolate, step_means
 from spoofgym.logs.log_warning import warn
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.facts import FilterFacts
@@ -228,16 +228,10 @@ class RecordedFamily(Immutable, ABC):
             covariance: the filter's R of fixes, (E, m, m).
         """
         log, time, grid = self.log, self.epoch_time, self.grid
-
-        def means(samples: Floats) -> Floats:
-            """Of straight lines between the samples, over each step of the grid."""
-            at = np.column_stack([np.interp(grid, log.imu_time, samples[:, a]) for a in range(3)])
-            return np.asarray(0.5 * (at[1:] + at[:-1]))
-
         return StrapdownModel(
             time=time,
-            angular_rate=means(log.angular_rate),
-            specific_force=means(log.specific_force),
+            angular_rate=step_means(log.imu_time, log.angular_rate, grid),
+            specific_force=step_means(log.imu_time, log.specific_force, grid),
             step=np.diff(grid),
             boundaries=np.searchsorted(grid, np.concatenate([[self.align_time], time])).astype(np.int64),
             fix_position=position,
