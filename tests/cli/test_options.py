@@ -32,19 +32,20 @@ LACKING = {
         "agents": "the card has it",
         "thresholds": "a threshold is the same for everybody who asks for it",
         "study recorded-ranges": NOTHING_IS_DRAWN,
-        "study fusion-ripper": NOTHING_IS_DRAWN,
+        **dict.fromkeys(("study fusion-ripper", "estimate-noise", "study noise"), NOTHING_IS_DRAWN),
     },
     "--threads": {
         **dict.fromkeys(("list", "report", "check", "import", "check-log"), LOOKS),
         **dict.fromkeys(("benchmark attack", "benchmark defend", "benchmark table", "benchmark references"), WORKERS),
         "bound bayes": WORKERS,
         **dict.fromkeys(("play", "evaluate recorded", "study recorded-ranges", "study fusion-ripper"), ONE_RUN),
+        **dict.fromkeys(("estimate-noise", "study noise"), ONE_RUN),
         **dict.fromkeys(("thresholds", "bound duel", "export", "agents", "reproduce", "study aids"), SERIAL),
     },
     "--import": {
         **dict.fromkeys(("report", "check", "import", "check-log", "reproduce"), NO_PARTS),
         **dict.fromkeys(("study self-tuning", "study patient-spoofer", "study recorded-ranges"), NO_PARTS),
-        "study fusion-ripper": NO_PARTS,
+        **dict.fromkeys(("study fusion-ripper", "estimate-noise", "study noise"), NO_PARTS),
         "train again": "a recipe names parts of spoofgym alone",
     },
 }
