@@ -139,7 +139,7 @@ def test_interruption_leaves_a_usable_policy(tmp_path, child):
     ("program", "arguments", "message"),
     [
         (spoofer, ["--scenario", "moon"], "unknown scenario 'moon'; valid names: foi-drive, kujur-flight, liu-flight"),
-        (spoofer, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: acceleration, acna, aid-innovation"),
+        (spoofer, ["--detector", "oracle"], "unknown detector 'oracle'; valid names: acceleration, acna"),
         (spoofer, ["--knowledge", "blind", "--action", "innovation"], "knowledge must be 'shadow' or 'full'"),
         (evaluate_spoofers, ["--scenario", "liu-flight:horizon=0"], "horizon must be a whole number, 1 or more, got 0"),
         (evaluate_spoofers, ["--attack", "ramp:-1"], "rate must be a finite number, 0 or more"),
