@@ -348,23 +348,24 @@ class Simulation:
         """What the receiver is made to believe at an epoch: by the attack, or by offsets from outside."""
         intervals = self._intervals[clock.index + self.burn_in]
         offset = given[:, :3] if attack is None else np.array(attack.offset(clock))
+        moved = given[:, 3] if given.shape[1] == 4 else self._no_offset[:, 0]
         if attack is not None:
             moved = attack.clock_offset(clock)
-        else:
-            moved = given[:, 3] if given.shape[1] == 4 else self._no_offset[:, 0]
         rate = (offset - self.offset) / intervals[:, None]
-        satellites = None
+        satellites = carrier = ranges = None
         if attack is not None:
             rate = attack.velocity(clock, rate)
             if self._family.slots:
                 slots = self._family.satellites(clock.index + self.burn_in, self.burn_in)
-                satellites = attack.captured(clock, slots)
-        return Spoof(offset.copy(), rate, moved.copy(), (moved - self.clock_offset) / intervals, satellites)
+                satellites, carrier, ranges = attack.captured(clock, slots), attack.carrier(clock), attack.ranges(clock)
+        pull = (moved - self.clock_offset) / intervals
+        return Spoof(offset.copy(), rate, moved.copy(), pull, satellites, carrier, ranges)
 
     @property
     def attacked(self) -> Flags:
         """Whether the present fix is spoofed, (N,)."""
-        return np.asarray(self.offset.any(axis=1) | (self.clock_offset != 0.0))
+        moved, attack = np.asarray(self.offset.any(axis=1) | (self.clock_offset != 0.0)), self.attack
+        return moved | attack.active(self.epoch) if attack is not None and attack.on_ranges else moved
 
     def _available(self, index: Runs, innovation: Innovation) -> Flags:
         """Whether there is a fix in each run, (N,); where there is none, nobody sees an innovation."""

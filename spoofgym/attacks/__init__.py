@@ -8,6 +8,7 @@ from spoofgym import validation
 from spoofgym.attacks.azimuth import FOI_ATTACKS, Azimuth
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.circle import Circle
+from spoofgym.attacks.code_only import CodeOnly
 from spoofgym.attacks.exponential import Exponential
 from spoofgym.attacks.families import (
     ClimbingSpiral,
@@ -75,7 +76,20 @@ def _around(make: Inside) -> dict[str, Callable[..., Attack]]:
         """
         return Partial(inside("partial", attack), satellites, numbers)
 
-    return {"tracking-error": tracking_error, "position-only": position_only, "partial": partial}
+    def code_only(attack: str) -> Attack:
+        """Another attack that moves the codes of satellites and leaves carriers and range rates as they are.
+
+        Args:
+            attack: the other one; "/" stands for its commas.
+        """
+        return CodeOnly(inside("code-only", attack))
+
+    return {
+        "tracking-error": tracking_error,
+        "position-only": position_only,
+        "partial": partial,
+        "code-only": code_only,
+    }
 
 
 ATTACKS: dict[str, Callable[..., Attack]] = {

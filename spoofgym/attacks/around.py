@@ -33,6 +33,7 @@ class AroundAttack(Attack):
         self.closed_loop = attack.closed_loop
         self.knowledge = attack.knowledge
         self.has_tracking_error = attack.has_tracking_error
+        self.on_ranges = attack.on_ranges
 
     def bind(self, timeline: Timeline, num_runs: int) -> None:
         """Fit the attack inside to a game.
@@ -67,6 +68,7 @@ class AroundAttack(Attack):
             ValueError: it needs what the simulation does not offer.
         """
         self.attack.join(simulation)
+        self.on_ranges = self.attack.on_ranges
 
     def reset(self, runs: Runs, streams: RunStreams) -> None:
         """Start new episodes of the attack inside."""
@@ -91,3 +93,11 @@ class AroundAttack(Attack):
     def captured(self, clock: Clock, satellites: Runs) -> Flags | None:
         """Which satellites' signals the receiver takes from the spoofer inside, (N, S); None = all."""
         return self.attack.captured(clock, satellites)
+
+    def carrier(self, clock: Clock) -> Flags | None:
+        """Whether carrier and range rate follow the code of the attack inside, (N,); None = they do."""
+        return self.attack.carrier(clock)
+
+    def ranges(self, clock: Clock) -> Floats | None:
+        """What the attack inside adds to the ranges as they are, (N, m), m and m/s; None = nothing."""
+        return self.attack.ranges(clock)

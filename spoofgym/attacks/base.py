@@ -32,6 +32,8 @@ class Attack(ABC):
         needs_ranges: whether the filter must take ranges.
         closed_loop: whether its offsets depend on what happens in the game, so that they cannot be told in advance.
         knowledge: what it sees while it plays, one of `KNOWLEDGE`.
+        on_ranges: whether it acts on ranges as they are (`ranges`), or was recorded in them, so that `active` alone
+            tells when.
         has_tracking_error: whether its offsets hold the error with which its spoofer tracks the vehicle.
     """
 
@@ -42,6 +44,7 @@ class Attack(ABC):
     needs_ranges: bool = False
     closed_loop: bool = False
     knowledge: str = "blind"
+    on_ranges: bool = False
     has_tracking_error: bool = False
 
     @property
@@ -124,6 +127,17 @@ class Attack(ABC):
         Args:
             clock: of the epoch.
             satellites: number of the satellite in each slot, (N, S); -1 = none.
+        """
+        return None
+
+    def carrier(self, clock: Clock) -> Flags | None:
+        """Whether carrier and range rate follow the spoofed code at the epoch, (N,); None = they do."""
+        return None
+
+    def ranges(self, clock: Clock) -> Floats | None:
+        """What is added to the ranges of the epoch beside, as they are, (N, m), m and m/s; None = nothing.
+
+        Only an attack that was recorded tells it; its offsets are then zero.
         """
         return None
 

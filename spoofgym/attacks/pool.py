@@ -172,6 +172,26 @@ class AttackPool(Attack):
                 taken = np.where((self.member == place)[:, None], part, everything)
         return taken
 
+    def carrier(self, clock: Clock) -> Flags | None:
+        """Whether carrier and range rate follow the code of each run's opponent, (N,); None = in every run."""
+        follows: Flags | None = None
+        for place, attack in enumerate(self._members):
+            part = attack.carrier(clock)
+            if part is not None:
+                everything = np.ones(self._num_runs, dtype=bool) if follows is None else follows
+                follows = np.where(self.member == place, part, everything)
+        return follows
+
+    def ranges(self, clock: Clock) -> Floats | None:
+        """What each run's opponent adds to the ranges as they are, (N, m), m and m/s; None = nothing in any run."""
+        added: Floats | None = None
+        for place, attack in enumerate(self._members):
+            part = attack.ranges(clock)
+            if part is not None:
+                nothing = np.zeros(part.shape) if added is None else added
+                added = np.where((self.member == place)[:, None], part, nothing)
+        return added
+
 
 def training_population(clean: float = DEFAULT_CLEAN, manoeuvre: float = DEFAULT_MANOEUVRE) -> AttackPool:
     """The attacks that a defender is trained on: ramps, jumps, and FOI-R-5687's growth with a run in parallel.

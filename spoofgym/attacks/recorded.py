@@ -15,10 +15,11 @@ NAME = "recorded"
 
 
 class Recorded(Attack):
-    """The attack in ``gnss_spoofed.csv`` of a log: the victim gets these fixes in place of the true ones.
+    """The attack that a log holds: the victim gets the fixes, or the ranges, that were recorded in it.
 
-    Position and velocity are spoofed as they were recorded. Only a scenario ``recorded:FOLDER`` with fixes can be
-    attacked with it.
+    They stand in ``gnss_spoofed.csv`` or ``ranges_spoofed.csv``, or ``ranges.csv`` itself is spoofed from
+    ``first_effect_s`` on; nothing is added then. Only a scenario ``recorded:FOLDER`` can be attacked with it. The
+    offsets of an attack on ranges are zero: nobody knows where it wanted the victim.
     """
 
     @property
@@ -27,7 +28,7 @@ class Recorded(Attack):
         return NAME
 
     def join(self, simulation: Any) -> None:
-        """Take the recorded offsets of the game's epochs.
+        """Take what was recorded at the game's epochs.
 
         Raises:
             ValueError: the scenario has no recorded attack, or the game does not begin before it.
@@ -36,8 +37,13 @@ class Recorded(Attack):
         read = getattr(scenario.family, "recorded_spoof", None)
         if read is None:
             raise ValueError(
-                f"attack {NAME!r} needs a recorded log whose fixes the filter takes, recorded:FOLDER with "
-                f"gnss_spoofed.csv in it; scenario {scenario.name!r} is none"
+                f"attack {NAME!r} needs a recorded log that holds one, recorded:FOLDER with gnss_spoofed.csv or "
+                f"ranges_spoofed.csv in it; scenario {scenario.name!r} is none"
+            )
+        if scenario.family.spoofed_within and not scenario.family.attacked:
+            raise ValueError(
+                f"attack {NAME!r}: the ranges of scenario {scenario.name!r} are spoofed themselves: its own option "
+                "attack=recorded plays them"
             )
         spoof = read()
         times = self._timeline.times
@@ -48,7 +54,9 @@ class Recorded(Attack):
             )
         place = np.searchsorted(spoof.time, times - 1e-6)
         self._offsets, self._velocities = spoof.offset[place], spoof.velocity[place]
-        self._last = self.end = spoof.end
+        self._ranges = None if spoof.ranges is None else spoof.ranges[place]
+        self.on_ranges = spoof.ranges is not None
+        self._last, self.end = spoof.end, spoof.end if np.isfinite(spoof.end) else None
         self._onset = self.onset = float(times[times < spoof.begin - 1e-6][-1])
 
     def offset(self, clock: Clock) -> Floats:
@@ -59,6 +67,10 @@ class Recorded(Attack):
         """What it adds to the true velocity, (N, 3), m/s ENU."""
         return np.asarray(self._velocities[np.maximum(clock.index, 0)])
 
+    def ranges(self, clock: Clock) -> Floats | None:
+        """What the victim's ranges are beside the true ones, (N, m), m and m/s."""
+        return None if self._ranges is None else np.asarray(self._ranges[np.maximum(clock.index, 0)])
+
     def active(self, clock: Clock) -> Flags:
-        """Whether the victim gets spoofed fixes, (N,)."""
+        """Whether the victim gets what is spoofed, (N,)."""
         return np.asarray((clock.time > self._onset) & (clock.time <= self._last + 1e-6))

@@ -41,6 +41,7 @@ GIVEN = {
     "tracking-error": "tracking-error:ramp:0.2,sigma=0.3",
     "position-only": "position-only:ramp:0.2",
     "partial": "partial:ramp:0.3,satellites=2",
+    "code-only": "code-only:ramp:0.3",
     "unseen": "unseen:16",
     "closed-form": "closed-form:16",
     "recorded": "recorded:FOLDER",

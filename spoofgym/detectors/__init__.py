@@ -15,6 +15,8 @@ from spoofgym.detectors.aime import Aime
 from spoofgym.detectors.base import Detector
 from spoofgym.detectors.bias_range import BiasRange
 from spoofgym.detectors.chi_square import DEFAULT_P_FA, Snapshot, Windowed
+from spoofgym.detectors.clock_drift import ClockDrift
+from spoofgym.detectors.code_minus_carrier import CodeMinusCarrier
 from spoofgym.detectors.cpi import DEFAULT_WINDOW as CUMULATED
 from spoofgym.detectors.cpi import Cpi
 from spoofgym.detectors.cusum import Cusum, SignedCusum
@@ -103,6 +105,8 @@ DETECTORS: dict[str, Callable[..., Detector]] = {
     "ci": _cumulative_innovation,
     "cpi": Cpi,
     "raim": Raim,
+    "clock-drift": ClockDrift,
+    "code-minus-carrier": CodeMinusCarrier,
     "aid-innovation": AidInnovation,
     "ensemble": _ensemble,
 }

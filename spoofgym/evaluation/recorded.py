@@ -11,6 +11,7 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.attacks.base import Attack
 from spoofgym.attacks.profiles import NoAttack
+from spoofgym.attacks.recorded import NAME as RECORDED
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.departure_rows import departure_entry
 from spoofgym.evaluation.departures import departures_of
@@ -18,6 +19,7 @@ from spoofgym.geodesy import horizontal, position_difference
 from spoofgym.logs.log import interpolate
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.clean_run import coasted_positions
+from spoofgym.scenarios.clean_scene import clean_scene
 from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 from spoofgym.simulation import Simulation
 from spoofgym.validation import written
@@ -65,7 +67,9 @@ def recorded_rows(
 
     Yields:
         A row per attack: attack, clean_error_median_m, clean_error_p95_m, mean_nis, false_alarms, clean_epochs,
+        alarms_before_onset (epochs of the game before the attack in which any detector alarms: false ones),
         detected, time_to_detect_s (from the attack's onset to the first alarm owed to it), error_at_detection_m,
+        alarm_after_pull_s (from the pull's beginning, where the log states it, to the first alarm from then on),
         max_error_m (largest horizontal error after the onset), error_epochs (after the onset, whose error is known:
         those in a hole of the reference have none), alarms_after_end (after the last spoofed fix, as far as the clean
         log has none there), recovery_s (from the last spoofed fix until the filter is back within `RECOVERED` of that
@@ -74,10 +78,16 @@ def recorded_rows(
         detection that did not happen, what follows the end of an attack that has none.
         An alarm without an attack is no detection, nor is one that comes at the same epoch of the clean log.
 
+        Where the log's own ranges are spoofed, clean figures are those of the clean scene (`clean_scene`), no alarm of
+        the game has a clean counterpart, and the filter has recovered where its error is within `RECOVERED` of that
+        before the attack.
+
     Raises:
-        ValueError: what `Simulation` refuses, or a log too short for clean figures.
+        ValueError: what `Simulation` refuses, a log too short for clean figures, or another attack on ranges that hold
+            one already.
     """
-    clean = clean_figures(scenario, detectors)
+    scene = clean_scene(scenario)
+    clean = clean_figures(scene, detectors)
     common = {
         "clean_error_median_m": None if clean.errors is None else float(np.median(clean.errors)),
         "clean_error_p95_m": None if clean.errors is None else float(np.percentile(clean.errors, 95.0)),
@@ -85,8 +95,13 @@ def recorded_rows(
         "false_alarms": clean.false_alarms,
         "clean_epochs": clean.epochs,
     }
-    false = _clean_alarms(scenario, detectors)
+    false = _clean_alarms(scenario, detectors) if scene is scenario else np.zeros(scenario.timeline.num_epochs, bool)
     for attack in attacks:
+        if scene is not scenario and attack.name != RECORDED:
+            raise ValueError(
+                f"scenario {scenario.name!r}: its ranges hold the recorded attack already; attack must be {RECORDED}, "
+                f"got {attack.name!r}"
+            )
         yield {"attack": attack.name} | common | _play(scenario, attack, detectors, false, seed)
 
 
@@ -183,16 +198,25 @@ def _play(
     """The part of a row that depends on the attack; ``false``: the alarms without one, (K,)."""
     simulation = Simulation(scenario, attack, detectors, seed=seed, fidelity="strapdown")
     onset = scenario.timeline.start if attack.onset is None else attack.onset
+    effects = recorded_family(scenario).log.effects
+    pull = effects.pull if effects is not None and attack.name == RECORDED else None
+    before, pulled = 0, None
     spoofing = not isinstance(attack, NoAttack)
     detection: tuple[float, float | None] | None = None
     errors, log = [], recorded_family(scenario)
     after_end, departed = 0, None
-    clean = position_difference(log.clean.position[1:], log.true_position)[log.first + 1 :]
+    clean = position_difference(log.clean.position[1:], log.true_position)
+    if log.attacked and log.spoofed_within:
+        clean[:] = clean[np.searchsorted(log.epoch_time, onset)]
+    clean = clean[log.first + 1 :]
     simulation.reset()
     simulation.resolve()
     for alarmed, compared, unspoofed in zip(false, log.compared[log.first + 1 :], clean, strict=False):
         time = float(simulation.observe().time[0])
         after = time > onset
+        before += bool(not after and simulation.alarm[0])
+        if pull is not None and pulled is None and time >= pull and simulation.alarm[0]:
+            pulled = time - pull
         if after and spoofing and detection is None and simulation.alarm[0] and not alarmed:
             detection = time - onset, float(horizontal(simulation.error)[0]) if compared else None
         simulation.resolve()
@@ -207,6 +231,8 @@ def _play(
     return {
         "detected": detection is not None,
         "time_to_detect_s": None if detection is None else detection[0],
+        "alarms_before_onset": before,
+        "alarm_after_pull_s": pulled,
         "error_at_detection_m": None if detection is None else detection[1],
         "max_error_m": float(np.max(errors)) if errors else None,
         "error_epochs": len(errors),

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from spoofgym.attacks.recorded import NAME as RECORDED
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.metrics import AttackerScore
 from spoofgym.scenario import Scenario
+from spoofgym.scenarios.clean_scene import clean_scene
 from spoofgym.scenarios.recorded_family import recorded_family
+from spoofgym.scenarios.recorded_resting import SIMULATED, RestingRanges
 
 SCHEMA_VERSION = 1
 
@@ -119,6 +122,8 @@ def recorded_report(scenario: Scenario, detectors: Sequence[Detector], rows: lis
         "scenario": scenario.name,
         "fidelity": "strapdown",
         "alignment": family.alignment.told(family.log),
+        "imu": f"{SIMULATED}: {family.imu.name}" if isinstance(family, RestingRanges) else RECORDED,
+        "clean_scene": clean_scene(scenario).name,
         "detector": detector_entry(detectors, scenario),
         "rows": rows,
     }

@@ -17,8 +17,9 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.geodesy import displace, position_difference
 from spoofgym.logs.fix_rows import known_sigmas, most_wild, usable_rows
 from spoofgym.logs.mounting import find_delay, find_mounting
-from spoofgym.logs.notes import ENU_OF_NED, Notes, StatedHeading
+from spoofgym.logs.notes import ENU_OF_NED, Effects, Notes, StatedHeading
 from spoofgym.logs.table import TIMES, check_increasing, has_table, read_table, seconds, table_path
+from spoofgym.sensors.klobuchar import Klobuchar
 
 IMU_COLUMNS = ("t_s", "gx_radps", "gy_radps", "gz_radps", "ax_mps2", "ay_mps2", "az_mps2")
 POSITION_COLUMNS = ("t_s", "lat_deg", "lon_deg", "h_m")
@@ -91,7 +92,10 @@ class Log:
         heading: that the log states of its start; None = it states none.
         declination: of the magnetic field, east of true north, rad; None = not stated.
         fix_delay: that was subtracted from the times of the fixes, s.
-        attacked: times of the first and the last spoofed fix in the table, s; None = not stated.
+        attacked: times of the first and the last spoofed fix, or range, in the table, s; None = not stated.
+        effects: when the log's own tables are spoofed; None = not stated.
+        antenna: where it rests, latitude rad, longitude rad, height m, (3,); None = it moves, or has an IMU.
+        ionosphere: that was broadcast; None = not stated.
     """
 
     name: str
@@ -110,6 +114,9 @@ class Log:
     declination: float | None = None
     fix_delay: float = 0.0
     attacked: tuple[float, float] | None = None
+    effects: Effects | None = None
+    antenna: Floats | None = None
+    ionosphere: Klobuchar | None = None
 
 
 def velocity_of(fixes: Fixes) -> Floats:
@@ -202,6 +209,11 @@ def read_tables(folder: str | Path) -> Tables:
         raise ValueError(f"log {str(folder)!r} is no folder; a log is a folder with log.toml, imu.csv and gnss.csv")
     notes = Notes(folder / "log.toml")
     notes.mounting(), notes.seconds("start_s", None)
+    if notes.antenna() is not None and not has_table(folder, "imu"):
+        raise ValueError(
+            f"log {str(folder)!r} has no imu.csv, and its antenna is static: recorded:{folder},imu=simulated:tactical "
+            "simulates a resting IMU of that grade"
+        )
     path = table_path(folder, "imu")
     imu = read_table(path, [IMU_COLUMNS], [], LIMITS)
     check_increasing(path, imu["t_s"])
@@ -244,6 +256,8 @@ def log_of(tables: Tables) -> Log:
         declination=notes.declination(),
         fix_delay=delay,
         attacked=notes.attacked(),
+        effects=notes.effects(),
+        ionosphere=notes.ionosphere(),
     )
     _check_overlap(log)
     if mounting is not None:

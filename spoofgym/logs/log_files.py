@@ -9,7 +9,7 @@ NOTES = "log.toml"
 EPHEMERIS = "ephemeris.csv"
 NOISE = "noise.toml"
 """The noises of the log as they were estimated, which a scenario reads where it is told to."""
-TABLES = ("imu", "gnss", "reference", "ranges", "barometer", "magnetometer", "wheels", "aux")
+TABLES = ("imu", "gnss", "reference", "ranges", "ranges_spoofed", "barometer", "magnetometer", "wheels", "aux")
 """Each is ``NAME.csv`` or ``NAME.csv.gz``."""
 
 State = tuple[str, tuple[tuple[str, int, int, int, int], ...]]

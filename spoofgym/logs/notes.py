@@ -13,6 +13,7 @@ import numpy as np
 
 from spoofgym import validation
 from spoofgym.arrays import Floats
+from spoofgym.sensors.klobuchar import TERMS, Klobuchar
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -22,18 +23,19 @@ else:
 SETTINGS = (
     *("name", "imu_to_body_frd", "start_s", "imu_delay_s", "gnss_delay_s", "antenna_lever_arm_m"),
     *("alignment", "heading_deg", "heading_sigma_deg", "declination_deg", "attack_start_s", "attack_end_s"),
+    *("static", "antenna_lat_deg", "antenna_lon_deg", "antenna_h_m", "iono_alpha", "iono_beta"),
+    *("first_effect_s", "pull_start_s", "pull_end_s"),
 )
 ALIGNMENTS = ("auto", "static", "attitude", "course", "coarse")
 """What ``alignment`` may say."""
 HEADING_SIGMA = 10.0
 """Of a heading that is stated without one, degrees."""
 REMARKS = (
-    *("vehicle", "source", "licence", "license", "date", "comment", "note", "week", "time", "static"),
+    *("vehicle", "source", "licence", "license", "date", "comment", "note", "week", "time"),
     *("imu", "imu_grade", "gyro_noise", "accel_noise", "gnss", "reference", "ranges", "ranges_sbas", "sky"),
     *("wheels", "attitude", "aux", "gnss_spoofed", "attack", "victim"),
-    *("first_offset_n_m", "first_offset_e_m", "largest_offset_m", "first_effect_s", "power_step_s"),
-    *("pull_start_s", "pull_full_s", "pull_slows_s", "pull_end_s", "pull_m", "range_rate_bias_mps"),
-    *("antenna_lat_deg", "antenna_lon_deg", "antenna_h_m", "rrt0_s", "iono_alpha", "iono_beta"),
+    *("first_offset_n_m", "first_offset_e_m", "largest_offset_m", "power_step_s"),
+    *("pull_full_s", "pull_slows_s", "pull_m", "range_rate_bias_mps", "rrt0_s"),
 )
 """Keys about the log that nothing reads; others lie in the table ``[notes]``."""
 NOTES = "notes"
@@ -63,6 +65,21 @@ class StatedHeading:
 
     value: float
     sigma: float
+
+
+@dataclass(frozen=True)
+class Effects:
+    """When an attack that was recorded as it was acts on the log's own tables.
+
+    Attributes:
+        begin: of the first effect, s.
+        end: of the last, s; None = that of the log.
+        pull: when the pull begins, s; None = not stated.
+    """
+
+    begin: float
+    end: float | None
+    pull: float | None
 
 
 class Notes:
@@ -152,6 +169,63 @@ class Notes:
         if end < begin:
             raise ValueError(f"{self.path}: attack_end_s = {end:g} lies before attack_start_s = {begin:g}")
         return begin, end
+
+    def effects(self) -> Effects | None:
+        """When the log's own tables are spoofed; None = the file states no ``first_effect_s``.
+
+        The end is that of ``attack_end_s``, else of ``pull_end_s``, else none.
+
+        Raises:
+            ValueError: a time is no number, or they come in another order.
+        """
+        if "first_effect_s" not in self:
+            return None
+        begin = self.seconds("first_effect_s", None)
+        last = next((key for key in ("attack_end_s", "pull_end_s") if key in self), None)
+        end = None if last is None else self.seconds(last, None)
+        pull = self.seconds("pull_start_s", None) if "pull_start_s" in self else None
+        for key, time in (("pull_start_s", pull), (last, end)):
+            if time is not None and time < begin:
+                raise ValueError(f"{self.path}: {key} = {time:g} lies before first_effect_s = {begin:g}")
+        return Effects(begin, end, pull)
+
+    def antenna(self) -> Floats | None:
+        """Where a static antenna is, latitude rad, longitude rad, height m, (3,); None = ``static`` is not true.
+
+        Raises:
+            ValueError: ``static`` is no truth value, or the position is missing or out of range.
+        """
+        static = self._values.get("static", False)
+        if not isinstance(static, bool):
+            raise ValueError(f"{self.path}: static must be true or false, got {static!r:.100}")
+        if not static:
+            return None
+        limits = {"antenna_lat_deg": (-89.0, 89.0), "antenna_lon_deg": (-360.0, 360.0), "antenna_h_m": (-12e3, 1e5)}
+        place = []
+        for key, (low, high) in limits.items():
+            value = self._values.get(key)
+            if value is None or not _is_number(value) or not low <= value <= high:
+                raise ValueError(
+                    f"{self.path}: static = true needs {key}, a number between {low:g} and {high:g}, got {value!r:.100}"
+                )
+            place.append(float(value))
+        return np.array([math.radians(place[0]), math.radians(place[1]), place[2]])
+
+    def ionosphere(self) -> Klobuchar | None:
+        """The broadcast model of the ionosphere; None = the file does not state it.
+
+        Raises:
+            ValueError: one half is missing, or is not four numbers.
+        """
+        if "iono_alpha" not in self and "iono_beta" not in self:
+            return None
+        halves = []
+        for key in ("iono_alpha", "iono_beta"):
+            value = self._values.get(key)
+            if not isinstance(value, list) or len(value) != TERMS or not all(map(_is_number, value)):
+                raise ValueError(f"{self.path}: {key} must be {TERMS} numbers of the GPS broadcast, got {value!r:.100}")
+            halves.append(tuple(map(float, value)))
+        return Klobuchar(*halves)
 
     def _degrees(self, key: str, low: float, high: float) -> float | None:
         value = self._values.get(key)

@@ -19,6 +19,7 @@ from spoofgym.logs.range_fixes import (
     solve_ranges,
 )
 from spoofgym.logs.ranges_log import Ranges, correct, read_ranges
+from spoofgym.logs.spoofed_ranges import spoofed_ranges
 from spoofgym.logs.table import has_table, seconds
 from spoofgym.sensors.geometry import SatelliteGeometry
 
@@ -35,7 +36,8 @@ class RangeEpochs:
     Steps of that clock have been taken away (`clock_steps`).
 
     An epoch in which the receiver gave nothing has empty slots. A satellite counts where both its code and its range
-    rate are usable, and neither is one that a fix of the epoch leaves out as faulty (`without_faults`).
+    rate are usable, and neither is one that a fix of the epoch leaves out as faulty (`without_faults`). An antenna that
+    rests has a position that is known, so that nothing is left out there: what a spoofer did to a range stays in sight.
 
     Attributes:
         time: on the clock of the IMU, (E,), s.
@@ -54,6 +56,9 @@ class RangeEpochs:
         clock_jump: variance of what a step of the clock leaves in its offset, (E,), m².
         fix: epochs that have a fix, (n,).
         fixes: of these epochs, on the clock of the IMU.
+        spoofed: epochs in which a recorded attack acts, (E,).
+        added: what it adds to these ranges: code, m, and range rate, m/s, (E, 2 S); zero where the ranges themselves
+            are those that the victim got.
     """
 
     time: Floats
@@ -71,6 +76,8 @@ class RangeEpochs:
     clock_jump: Floats
     fix: Runs
     fixes: Fixes
+    spoofed: Flags
+    added: Floats
 
     def part(self, first: int, last: int) -> RangeEpochs:
         """Epochs first..last-1 of these, with all the fixes."""
@@ -93,15 +100,19 @@ def range_epochs(log: Log) -> RangeEpochs:
     """
     if not has_table(log.folder, "ranges"):
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) for a filter to take")
-    start = log.fixes.position[0]
-    ranges = steady(without_steps(read_ranges(log.folder), start), str(log.folder))
+    start, owner = log.fixes.position[0], str(log.folder)
+    read = read_ranges(log.folder, ionosphere=log.ionosphere)
+    stepless = without_steps(read, start)
+    ranges, marked = steady(stepless, owner), steady(spoofed_ranges(log, read).marked(read, stepless), owner)
     solution = solve_ranges(ranges, start)
     check_solved(log, ranges, solution)
     delay = range_delay(log, solution)
     position, velocity = between_fixes(solution)
     clock, drift = (along_fixes(values, solution) for values in (solution.clock, solution.clock_drift))
     corrected = correct(ranges, position, clock)
-    counts = corrected.geometry.present & solution.used & solution.used_rate
+    counts = corrected.geometry.present & corrected.has_rate
+    if log.antenna is None:
+        counts = counts & solution.used & solution.used_rate
     slots = counts.any(axis=0)
     counts = counts[:, slots]
 
@@ -134,6 +145,8 @@ def range_epochs(log: Log) -> RangeEpochs:
         clock_jump=ranges.clock_jump,
         fix=np.flatnonzero(solution.solved),
         fixes=fixes_of(solution, delay),
+        spoofed=np.asarray(marked.has_rate.any(axis=1)),
+        added=np.concatenate([kept(marked.pseudorange), kept(marked.range_rate)], axis=1),
     )
 
 

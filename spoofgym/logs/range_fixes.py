@@ -81,7 +81,7 @@ def range_fixes(log: Log) -> Fixes:
     """
     if not has_table(log.folder, "ranges"):
         raise ValueError(f"log {str(log.folder)!r} has no ranges (ranges.csv, ephemeris.csv) to make fixes from")
-    ranges = read_ranges(log.folder)
+    ranges = read_ranges(log.folder, ionosphere=log.ionosphere)
     solution = solve_ranges(ranges, log.fixes.position[0])
     check_solved(log, ranges, solution)
     return fixes_of(solution, range_delay(log, solution))
@@ -130,11 +130,14 @@ def fixes_of(solution: RangeSolution, delay: float) -> Fixes:
 def range_delay(log: Log, solution: RangeSolution) -> float:
     """How much later than on the log's clock the ranges are received on the clock of GPS, s.
 
-    It is found from the drive, as the delay of the fixes is where the mounting is unknown (`find_delay`).
+    It is found from the drive, as the delay of the fixes is where the mounting is unknown (`find_delay`). An antenna
+    that rests has no IMU but a simulated one, on the clock of GPS.
 
     Raises:
         ValueError: the drive does not tell it.
     """
+    if log.antenna is not None:
+        return 0.0
     time, velocity = solution.corrected.geometry.time[solution.solved], solution.velocity[solution.solved]
     after = time >= log.start
     moved = time[after], velocity[after]

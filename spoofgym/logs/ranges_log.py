@@ -1,7 +1,8 @@
 """Ranges of a recorded log: the receiver's raw measurements, and what is known of them taken away.
 
-Satellite clock, group delay and the mean troposphere are corrected. The ionosphere is not: a log has no parameters of
-it. What is common to all satellites goes into the receiver's clock, the rest stays as an error of metres.
+Satellite clock, group delay and the mean troposphere are corrected, and the ionosphere where the log states the
+parameters that were broadcast. Of what is left, the part common to all satellites goes into the receiver's clock, the
+rest stays as an error of metres.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.logs.table import TIMES, read_table, seconds, table_path
 from spoofgym.sensors.ephemeris import Ephemeris, read_csv, time_between
 from spoofgym.sensors.geometry import SatelliteGeometry, lines_of_sight, received_states
+from spoofgym.sensors.klobuchar import Klobuchar
 from spoofgym.sensors.ranging import troposphere_mapping
 
+TABLE = "ranges"
 RANGE_COLUMNS = ("t_s", "svid", "pseudorange_m", "range_rate_mps", "cn0_dbhz")
 RATE_SIGMA_COLUMN = ("rr_std",)
 LIMITS = {
@@ -64,6 +67,7 @@ class Ranges:
         cn0: carrier power over noise density, (E, S), dB-Hz.
         clock_jump: variance of what a step of the receiver's clock leaves in its offset, (E,), m²; 0 as they are read.
         ephemeris: of the S satellites.
+        ionosphere: the model that was broadcast; None = its delay is not corrected.
     """
 
     time: Floats
@@ -74,6 +78,7 @@ class Ranges:
     cn0: Floats
     clock_jump: Floats
     ephemeris: Ephemeris
+    ionosphere: Klobuchar | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,18 +102,20 @@ class CorrectedRanges:
     has_rate: Flags
 
 
-def read_ranges(folder: str | Path) -> Ranges:
+def read_ranges(folder: str | Path, name: str = TABLE, ionosphere: Klobuchar | None = None) -> Ranges:
     """The ranges of a log to healthy satellites with an ephemeris.
 
     Args:
         folder: holds ``ephemeris.csv`` and ``ranges.csv``, perhaps gzipped.
+        name: of the table, less its ending.
+        ionosphere: the model that was broadcast; None = not known.
 
     Raises:
         ValueError: a file or column is missing, a value is no number or out of range, time decreases, a satellite is
             there twice at one time, none has an ephemeris, or an ephemeris is too old.
     """
     folder = Path(folder)
-    path = table_path(folder, "ranges")
+    path = table_path(folder, name)
     ephemeris_path = folder / "ephemeris.csv"
     if not ephemeris_path.is_file():
         raise ValueError(f"{ephemeris_path} is missing: ranges need the satellites' ephemerides")
@@ -145,6 +152,7 @@ def read_ranges(folder: str | Path) -> Ranges:
         cn0=packed(table["cn0_dbhz"], 0.0),
         clock_jump=np.zeros(len(time)),
         ephemeris=ephemeris,
+        ionosphere=ionosphere,
     )
 
 
@@ -176,6 +184,9 @@ def correct(ranges: Ranges, position: Floats, clock: Floats) -> CorrectedRanges:
     satellite_clock = ranges.ephemeris.clock(sent) - ranges.ephemeris.tgd
     step = ranges.ephemeris.clock(sent + 0.5 * CLOCK_STEP) - ranges.ephemeris.clock(sent - 0.5 * CLOCK_STEP)
     delay = zenith_troposphere(position)[:, None] * troposphere_mapping(np.maximum(elevation, MASK))
+    azimuth = np.mod(np.arctan2(sight[..., 0], sight[..., 1]), 2.0 * np.pi)
+    if ranges.ionosphere is not None:
+        delay = delay + ranges.ionosphere.delay(position, np.maximum(elevation, MASK), azimuth, received)
     weakness = 10.0 ** ((REFERENCE_CN0 - np.minimum(ranges.cn0, STRONGEST_CN0)) / 20.0)
 
     def kept(values: Any, empty: Any = 0.0) -> Any:
@@ -189,7 +200,7 @@ def correct(ranges: Ranges, position: Floats, clock: Floats) -> CorrectedRanges:
             velocity=kept(velocity),
             line_of_sight=kept(sight),
             elevation=kept(elevation),
-            azimuth=kept(np.mod(np.arctan2(sight[..., 0], sight[..., 1]), 2.0 * np.pi)),
+            azimuth=kept(azimuth),
         ),
         pseudorange=kept(ranges.pseudorange + speed_of_light * satellite_clock - delay),
         sigma=kept(CODE_SIGMA * weakness),

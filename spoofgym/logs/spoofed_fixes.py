@@ -18,14 +18,16 @@ SAME_TIME = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class RecordedSpoof:
-    """What a recorded attack adds to the fixes of a log.
+    """What a recorded attack adds to the fixes, or to the ranges, of a log.
 
     Attributes:
-        time: of the log's fixes, (n,), s.
+        time: of the log's fixes, or of the epochs of its ranges, (n,), s.
         offset: of the positions, (n, 3), m ENU; zero outside the attack.
         velocity: of the velocities, (n, 3), m/s ENU; zero outside the attack and where the victim got none.
         begin: of the first spoofed fix, s.
         end: of the last spoofed fix, s.
+        ranges: what it adds to code and range rate of every slot, (n, 2 S), m and m/s, with offsets of zero; None =
+            the attack is on fixes.
     """
 
     time: Floats
@@ -33,6 +35,7 @@ class RecordedSpoof:
     velocity: Floats
     begin: float
     end: float
+    ranges: Floats | None = None
 
 
 def recorded_spoof(log: Log) -> RecordedSpoof:

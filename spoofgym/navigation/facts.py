@@ -29,6 +29,7 @@ class FilterFacts:
         auxiliary_sigma: 1 sigma of what the odometer's solution goes wrong in an epoch at the end of the game, m; None
             = there is no odometer.
         range_model: burn-in -> the model of a filter on ranges (`TightModel`), every range used; None = it takes fixes.
+        observable: what a receiver of ranges measures beside the code, ``carrier`` or ``rate``; None = it gives fixes.
         matched: whether clean innovations before epoch 0 are drawn, white, as of epoch 0; else the filter has really
             been there.
         aids: what corrects the filter beside GNSS, by name, and the rows of a measurement of each.
@@ -42,6 +43,7 @@ class FilterFacts:
     fix_sigma: float | None = None
     auxiliary_sigma: float | None = None
     range_model: Callable[[int], object] | None = None
+    observable: str | None = None
     matched: bool = True
     aids: tuple[tuple[str, int], ...] = ()
 

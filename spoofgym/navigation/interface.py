@@ -128,6 +128,8 @@ class Spoof:
         clock: offset of the receiver's clock, (N,), m. A receiver of fixes solves for its clock and does not show it.
         clock_rate: its rate, (N,), m/s.
         satellites: slots whose signal the receiver takes from the spoofer, (N, S); None = all.
+        carrier: whether the carrier, and with it the range rate, follows the code, (N,); None = in every run.
+        ranges: what a recorded attack adds to each range beside, (N, m), m and m/s; None = nothing.
     """
 
     offset: Floats
@@ -135,6 +137,8 @@ class Spoof:
     clock: Floats
     clock_rate: Floats
     satellites: Flags | None = None
+    carrier: Flags | None = None
+    ranges: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -316,6 +320,14 @@ class RangeNavigator(Navigator, Protocol):
     def clock_error(self) -> Floats:
         """Estimate minus truth of the receiver's clock, (N,), m."""
 
+    @property
+    def measured(self) -> Floats:
+        """Code and second observable of the present epoch as they were measured, (N, m), m and m/s.
+
+        Less what both share, up to a constant of each satellite: geometry, clocks, troposphere. So their difference,
+        code minus carrier, is that of the raw measurements, and nothing else of them is of use.
+        """
+
 
 class FilterView:
     """What the filter of some runs knows beside its innovation, before the present fix is resolved; never the truth.
@@ -385,6 +397,11 @@ class FilterView:
     def inertial_covariance(self) -> Floats:
         """The filter's covariance of the inertial states, (N, 15, 15); of a filter on ranges."""
         return self._on_ranges.inertial_covariance[self._runs]
+
+    @cached_property
+    def measured(self) -> Floats:
+        """Code and second observable as measured, less what both share, (N, m), m and m/s; of a filter on ranges."""
+        return self._on_ranges.measured[self._runs]
 
     @cached_property
     def position_gain(self) -> Floats:

@@ -23,11 +23,12 @@ from spoofgym.logs.fix_rows import DEFAULT_SIGMA
 from spoofgym.logs.lever_arm import with_velocity_at_imu
 from spoofgym.logs.log import Log
 from spoofgym.logs.log_files import NOISE
-from spoofgym.logs.log_noise import LogNoise, read_noise
+from spoofgym.logs.log_noise import read_noise
 from spoofgym.logs.log_warning import warn
 from spoofgym.logs.range_epochs import range_epochs
 from spoofgym.logs.range_fixes import range_fixes
 from spoofgym.logs.reference import checked_reference
+from spoofgym.logs.resting_log import resting_log
 from spoofgym.navigation.aids import Aid, make_aids, spell_aids
 from spoofgym.navigation.family import COUPLINGS
 from spoofgym.navigation.tuning import FilterTuning
@@ -36,10 +37,20 @@ from spoofgym.scenarios.limits import NOISE_FACTORS
 from spoofgym.scenarios.log_aids import read_aid
 from spoofgym.scenarios.recorded_aided import RecordedAided
 from spoofgym.scenarios.recorded_loose import SIGMA_FLOOR, RecordedFixes
-from spoofgym.scenarios.recorded_tight import RecordedRanges
+from spoofgym.scenarios.recorded_resting import SIMULATED, RestingRanges
+from spoofgym.scenarios.recorded_tight import ERRORS, RecordedRanges
+from spoofgym.sensors.imu import ImuGrade
 from spoofgym.sensors.imu import grade as imu_grade
+from spoofgym.sensors.oscillator import OSCILLATORS
+from spoofgym.sensors.ranging import RangeErrors
 from spoofgym.specification import spell
 
+GRADE = "automotive"
+"""That the filter believes in, where nothing else is said."""
+OSCILLATOR = "tcxo"
+"""Class of the receiver's clock, where nothing else is said."""
+ATTACKS = ("recorded",)
+"""What a game on a log may be made of."""
 FIXES = ("phone", "ranges")
 """Which fixes a filter may take: those in the log, or those made from its raw ranges."""
 ESTIMATED = "estimated"
@@ -55,34 +66,40 @@ an independent result, and cautious there (mean NIS well below the fix's dimensi
 
 def recorded(
     path: str,
-    grade: str = "automotive",
+    grade: str | None = None,
     onset: float | None = None,
     horizon: int | None = None,
     velocity: bool | None = None,
     sigma_floor: float = SIGMA_FLOOR,
-    noise_factor: float = NOISE_FACTOR,
+    noise_factor: float | None = None,
     fixes: str = FIXES[0],
-    coupling: str = COUPLINGS[0],
+    coupling: str | None = None,
     alignment: str | None = None,
     least_speed: float | None = None,
     guidance: str | None = None,
     noise: str | None = None,
     aids: str | None = None,
+    imu: str | None = None,
+    oscillator: str = OSCILLATOR,
+    attack: str | None = None,
+    clean: str | None = None,
 ) -> Scenario:
     """A log in the project's format as a game.
 
     Args:
         path: folder of the log; no comma in it.
-        grade: name of the IMU grade that the filter believes in.
+        grade: name of the IMU grade that the filter believes in; None = automotive, or that of a simulated IMU.
         onset: time of the last clean epoch, s (the last one up to it is taken); None = a third of the way from the
-            log's start to its end.
+            log's start to its end, or 20 s before the attack that the log holds, where this is earlier.
         horizon: epochs of the game; None = to the end of the log.
         velocity: whether the filter uses the receiver's velocity beside its position; None = where the log has it.
         sigma_floor: smallest 1 sigma of a fix that the filter believes, m and m/s.
-        noise_factor: the filter's white inertial noise over the data sheet's, from 0.001 to 1000.
+        noise_factor: the filter's white inertial noise over the data sheet's, from 0.001 to 1000; None = 20, or 1 with
+            a simulated IMU.
         fixes: which ones the filter takes: ``phone``, those in the log, whatever receiver made them, or ``ranges``,
             least squares of the log's raw ranges (`range_fixes`).
-        coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of the log's raw ranges.
+        coupling: ``loose``: the filter takes fixes; ``tight``: it takes code and rate of the log's raw ranges; None =
+            loose, or tight with a simulated IMU.
         alignment: how the filter starts (`spoofgym.logs.alignment`): ``auto``, ``static``, ``attitude``, ``course`` or
             ``coarse``; None = as ``log.toml`` says, else ``auto``.
         least_speed: whose course counts as heading, m/s; None = 5 m/s, or what the accuracy of the velocity allows.
@@ -94,66 +111,48 @@ def recorded(
         aids: what corrects the filter beside GNSS, from the log's own tables: ``barometer``, ``magnetometer``,
             ``wheel-speed`` and ``zero-velocity``, those that there are joined by ``+``, each with ``/`` in place of the
             commas between its options; None = nothing.
+        imu: ``simulated:GRADE``: the antenna rests and the log has no IMU; one of this grade at rest is simulated, each
+            run has its own.
+        oscillator: class of the receiver's clock that a filter on ranges believes in: ``tcxo``, ``ocxo`` or
+            ``rubidium``.
+        attack: ``recorded``: the game is the attack that the log holds.
+        clean: folder of a log of the same scene without the attack, for thresholds and false alarms; None = what comes
+            before the attack.
 
     Raises:
         ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
-            horizon outside it, a number that is not positive, a file of noises that is missing or wrong, or options
-            that do not go together.
+            horizon outside it, a number that is not positive, or options that do not go together.
     """
     path = str(Path(path))
     if "," in path:
         raise ValueError(f"recorded: a path must not contain a comma, which separates options; got {path!r}")
-    imu = imu_grade(grade)
-    if onset is not None:
-        onset = validation.time("recorded", "onset", onset)
-    sigma_floor = validation.above("recorded", "sigma_floor", sigma_floor)
-    noise_factor = validation.between("recorded", "noise_factor", noise_factor, *map(math.sqrt, NOISE_FACTORS))
-    fixes = validation.one_of("recorded", "fixes", fixes, FIXES)
-    coupling = validation.one_of("recorded", "coupling", coupling, COUPLINGS)
-    if alignment is not None:
-        alignment = validation.one_of("recorded", "alignment", alignment, METHODS)
-    if least_speed is not None:
-        least_speed = validation.above("recorded", "least_speed", least_speed)
-    if coupling == "tight" and (velocity is not None or sigma_floor != SIGMA_FLOOR or fixes != FIXES[0]):
-        raise ValueError("recorded: velocity, sigma_floor and fixes are of fixes; coupling=tight takes none")
-    if noise is not None and "," in noise:
-        raise ValueError(f"recorded: noise must not contain a comma, which separates options; got {noise!r}")
-    if noise is not None and (noise_factor != NOISE_FACTOR or sigma_floor != SIGMA_FLOOR or coupling == "tight"):
-        raise ValueError("recorded: noise takes the place of noise_factor and sigma_floor, and needs coupling=loose")
-    believed = None if noise is None else read_noise(noise_file(path, noise))
-    sensors = make_aids("recorded", aids)
-    if coupling == "tight" and sensors:
-        raise ValueError("recorded: aids go with coupling=loose; the filter that takes ranges has none yet")
-    options = {
-        "grade": (grade, "automotive"),
-        "onset": (None if onset is None else np.format_float_positional(onset, trim="-"), None),
-        "horizon": (horizon, None),
-        "velocity": (velocity, None),
-        "sigma_floor": (sigma_floor, SIGMA_FLOOR),
-        "noise_factor": (noise_factor, NOISE_FACTOR),
-        "fixes": (fixes, FIXES[0]),
-        "coupling": (coupling, COUPLINGS[0]),
-        "alignment": (alignment, None),
-        "least_speed": (least_speed, None),
-        "noise": (noise, None),
-        "aids": (spell_aids(sensors), None),
-    }
-    name = spell("recorded", path, **{key: value for key, (value, default) in options.items() if value != default})
-    tuning = FilterTuning(
-        attitude_sigma=COURSE_SIGMA,  # replaced by that of the alignment
-        velocity_sigma=ALIGNMENT_VELOCITY_SIGMA,
-        position_sigma=DEFAULT_SIGMA[:3],
-        initial_scale=1.0,
-        process_noise_scale=noise_factor**2,
-        measurement_sigma=DEFAULT_SIGMA,
+    simulated = None if imu is None else simulated_grade(imu)
+    grade = grade or (GRADE if simulated is None else simulated.name)
+    if attack is not None:
+        validation.one_of("recorded", "attack", attack, ATTACKS)
+    if clean is not None and attack is None:
+        raise ValueError("recorded: clean names the scene of attack=recorded without its attack; attack is not given")
+    options = _Options(
+        path=path,
+        grade=imu_grade(grade),
+        onset=None if onset is None else validation.time("recorded", "onset", onset),
+        horizon=horizon,
+        velocity=velocity,
+        sigma_floor=validation.above("recorded", "sigma_floor", sigma_floor),
+        noise_factor=_noise_factor(noise_factor, simulated),
+        fixes=validation.one_of("recorded", "fixes", fixes, FIXES),
+        coupling=_coupling(coupling, simulated),
+        alignment=None if alignment is None else validation.one_of("recorded", "alignment", alignment, METHODS),
+        least_speed=None if least_speed is None else validation.above("recorded", "least_speed", least_speed),
+        noise=noise,
+        aids=make_aids("recorded", aids),
+        simulated=simulated,
+        oscillator=validation.one_of("recorded", "oscillator", oscillator, tuple(OSCILLATORS)),
+        attack=attack,
+        clean=None if clean is None else str(Path(clean)),
     )
-    asked = _Fixes(fixes, velocity, sigma_floor, believed, sensors)
-    common = {"name": name, "grade": imu, "tuning": tuning, "onset": onset, "horizon": horizon}
-    common |= {"aligned": alignment, "least_speed": least_speed}
-    log = checked_log(path)
-    if coupling == "tight" or fixes == "ranges":
-        check_ranges_of(path)
-    family = FAMILIES[coupling](log, asked, **common)
+    options.check()
+    family = options.family()
     made = Scenario(family=family, drag_off_rate=DRAG_OFF_RATE, error_scale=10.0, clock_rate=DRAG_OFF_RATE[0])
     return made.guided(guidance, "lateral")
 
@@ -163,25 +162,144 @@ def noise_file(path: str, noise: str) -> Path:
     return Path(path) / NOISE if noise == ESTIMATED else Path(noise)
 
 
-@dataclass(frozen=True)
-class _Fixes:
-    """What a user says of the fixes; as in `recorded`."""
+def simulated_grade(imu: str) -> ImuGrade:
+    """The grade of a simulated IMU, spelled ``simulated:GRADE``.
 
-    kind: str
+    Raises:
+        ValueError: another word, or an unknown grade.
+    """
+    kind, _, name = str(imu).partition(":")
+    if kind != SIMULATED or not name:
+        raise ValueError(f"recorded: imu must be {SIMULATED}:GRADE, e.g. {SIMULATED}:tactical, got {imu!r}")
+    with validation.argument("recorded", "imu"):
+        return imu_grade(name)
+
+
+def _noise_factor(given: float | None, simulated: ImuGrade | None) -> float:
+    usual = NOISE_FACTOR if simulated is None else 1.0
+    low, high = map(math.sqrt, NOISE_FACTORS)
+    return validation.between("recorded", "noise_factor", usual if given is None else given, low, high)
+
+
+def _coupling(given: str | None, simulated: ImuGrade | None) -> str:
+    if simulated is None:
+        return validation.one_of("recorded", "coupling", COUPLINGS[0] if given is None else given, COUPLINGS)
+    if given not in (None, "tight"):
+        raise ValueError(f"recorded: imu={SIMULATED} needs coupling=tight, got {given!r}")
+    return "tight"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options:
+    """Those of `recorded`, checked one by one and with their defaults in place."""
+
+    path: str
+    grade: ImuGrade
+    onset: float | None
+    horizon: int | None
     velocity: bool | None
     sigma_floor: float
-    noise: LogNoise | None
+    noise_factor: float
+    fixes: str
+    coupling: str
+    alignment: str | None
+    least_speed: float | None
+    noise: str | None
     aids: tuple[Aid, ...]
+    simulated: ImuGrade | None
+    oscillator: str
+    attack: str | None
+    clean: str | None
+
+    def check(self) -> None:
+        """Refuse options that do not go together.
+
+        Raises:
+            ValueError: naming them.
+        """
+        of_fixes = self.velocity is not None or self.sigma_floor != SIGMA_FLOOR or self.fixes != FIXES[0]
+        if self.coupling == "tight" and of_fixes:
+            raise ValueError("recorded: velocity, sigma_floor and fixes are of fixes; coupling=tight takes none")
+        if self.noise is not None and "," in self.noise:
+            raise ValueError(f"recorded: noise must not contain a comma, which separates options; got {self.noise!r}")
+        stated = self.noise_factor != NOISE_FACTOR or self.sigma_floor != SIGMA_FLOOR
+        if self.noise is not None and (stated or self.coupling == "tight"):
+            told = "takes the place of noise_factor and sigma_floor, and needs coupling=loose"
+            raise ValueError(f"recorded: noise {told}")
+        if self.coupling == "tight" and self.aids:
+            raise ValueError("recorded: aids go with coupling=loose; the filter that takes ranges has none yet")
+        if self.coupling != "tight" and self.oscillator != OSCILLATOR:
+            raise ValueError("recorded: oscillator is that of a receiver of ranges: coupling=tight is needed")
+        if self.simulated is not None and (self.alignment is not None or self.least_speed is not None):
+            raise ValueError(f"recorded: alignment and least_speed are not for imu={SIMULATED}: its attitude is known")
+
+    @property
+    def name(self) -> str:
+        """The specification, without what is usual."""
+        simulated = self.simulated
+        usual = {
+            "grade": GRADE if simulated is None else simulated.name,
+            "sigma_floor": SIGMA_FLOOR,
+            "noise_factor": NOISE_FACTOR if simulated is None else 1.0,
+            "fixes": FIXES[0],
+            "oscillator": OSCILLATOR,
+            "coupling": COUPLINGS[0] if simulated is None else "tight",
+        }
+        given = {
+            "grade": self.grade.name,
+            "onset": None if self.onset is None else np.format_float_positional(self.onset, trim="-"),
+            "horizon": self.horizon,
+            "velocity": self.velocity,
+            "sigma_floor": self.sigma_floor,
+            "noise_factor": self.noise_factor,
+            "fixes": self.fixes,
+            "coupling": self.coupling,
+            "alignment": self.alignment,
+            "least_speed": self.least_speed,
+            "noise": self.noise,
+            "aids": spell_aids(self.aids),
+            "imu": None if simulated is None else f"{SIMULATED}:{simulated.name}",
+            "oscillator": self.oscillator,
+            "attack": self.attack,
+            "clean": self.clean,
+        }
+        return spell("recorded", self.path, **{key: value for key, value in given.items() if value != usual.get(key)})
+
+    @property
+    def errors(self) -> RangeErrors:
+        """What a filter on ranges believes of them."""
+        clock = OSCILLATORS[self.oscillator]
+        return replace(ERRORS, clock_h0=clock.h0, clock_h2=clock.h2)
+
+    def family(self) -> RecordedFixes | RecordedRanges:
+        """The filters on the log."""
+        tuning = FilterTuning(
+            attitude_sigma=COURSE_SIGMA,  # replaced by that of the alignment
+            velocity_sigma=ALIGNMENT_VELOCITY_SIGMA,
+            position_sigma=DEFAULT_SIGMA[:3],
+            initial_scale=1.0,
+            process_noise_scale=self.noise_factor**2,
+            measurement_sigma=DEFAULT_SIGMA,
+        )
+        common = {"name": self.name, "grade": self.grade, "tuning": tuning, "onset": self.onset}
+        common |= {"horizon": self.horizon, "aligned": self.alignment, "least_speed": self.least_speed}
+        common |= {"attacked": self.attack is not None}
+        if self.coupling == "tight" or self.fixes == "ranges":
+            check_ranges_of(self.path)
+        if self.simulated is not None:
+            return _resting(resting_log(self.path), imu=self.simulated, errors=self.errors, **common)
+        return FAMILIES[self.coupling](checked_log(self.path), self, **common)
 
 
-def _loose(log: Log, asked: _Fixes, *, tuning: FilterTuning, **common: Any) -> RecordedFixes:
+def _loose(log: Log, asked: _Options, *, tuning: FilterTuning, **common: Any) -> RecordedFixes:
     """The filter that takes fixes."""
-    if asked.kind == "ranges":
+    noise = None if asked.noise is None else read_noise(noise_file(asked.path, asked.noise))
+    if asked.fixes == "ranges":
         log = replace(log, fixes=range_fixes(log))
     log = with_velocity_at_imu(checked_reference(log))
     if asked.velocity is False or (asked.velocity is None and log.fixes.velocity is None):
         tuning = replace(tuning, measurement_sigma=DEFAULT_SIGMA[:3])
-    common |= {"log": log, "tuning": tuning, "sigma_floor": asked.sigma_floor, "noise": asked.noise}
+    common |= {"log": log, "tuning": tuning, "sigma_floor": asked.sigma_floor, "noise": noise}
     if not asked.aids:
         return RecordedFixes(**common)
     found = [read_aid(log, aid) for aid in asked.aids]
@@ -190,11 +308,17 @@ def _loose(log: Log, asked: _Fixes, *, tuning: FilterTuning, **common: Any) -> R
     )
 
 
-def _tight(log: Log, asked: _Fixes, **common: Any) -> RecordedRanges:
+def _tight(log: Log, asked: _Options, **common: Any) -> RecordedRanges:
     """The filter that takes code and rate of the raw ranges."""
     epochs = range_epochs(log)
     log = checked_reference(replace(log, fixes=epochs.fixes, lever_arm=_no_arm(log)))
-    return RecordedRanges(log=log, epochs=epochs, **common)
+    return RecordedRanges(log=log, epochs=epochs, errors=asked.errors, **common)
+
+
+def _resting(log: Log, **common: Any) -> RestingRanges:
+    """The filter on the ranges of an antenna that rests, with a simulated IMU."""
+    epochs = range_epochs(log)
+    return RestingRanges(log=checked_reference(replace(log, fixes=epochs.fixes)), epochs=epochs, **common)
 
 
 FAMILIES: dict[str, Callable[..., RecordedFixes | RecordedRanges]] = {"loose": _loose, "tight": _tight}

@@ -17,6 +17,7 @@ from spoofgym.logs.alignment import Alignment, align
 from spoofgym.logs.imu_gaps import refuse_gaps
 from spoofgym.logs.log import Log, covered, interpolate, step_means
 from spoofgym.logs.log_warning import warn
+from spoofgym.logs.spoofed_fixes import RecordedSpoof
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.linear_model import LinearModel
@@ -27,6 +28,8 @@ from spoofgym.scenarios.clean_run import CleanRun, CleanRunDivergedError, coast
 from spoofgym.sensors.imu import ImuGrade
 from spoofgym.timeline import Timeline
 
+LEAD = 20.0
+"""Time before a recorded attack at which its game begins at the latest, s."""
 SETTLING = 30.0
 """Time after the alignment that clean figures leave out, s: heading and biases are still being found."""
 
@@ -46,6 +49,7 @@ class RecordedFamily(Immutable, ABC):
         onset: latest time of epoch 0, the last clean epoch, s; None = a third of the way from the log's start to its
             end.
         horizon: epochs of the game; None = to the end of the log.
+        attacked: whether the game is the attack that the log holds, and begins before it.
         doubts: what is likely wrong with a log on which the filter is bad.
     """
 
@@ -66,6 +70,7 @@ class RecordedFamily(Immutable, ABC):
     horizon: int | None = None
     aligned: str | None = None
     least_speed: float | None = None
+    attacked: bool = False
 
     def __post_init__(self) -> None:
         onset, end = float(self.epoch_time[self.first]), float(self.epoch_time[self.last])
@@ -107,6 +112,15 @@ class RecordedFamily(Immutable, ABC):
     @abstractmethod
     def clean(self) -> CleanRun:
         """The filter on unspoofed measurements, from the alignment to the end of the log."""
+
+    @property
+    def spoofed_within(self) -> bool:
+        """Whether the log's own measurements are spoofed at some time: nobody knows the true ones then."""
+        return False
+
+    @abstractmethod
+    def recorded_spoof(self) -> RecordedSpoof:
+        """The real attack that the log holds; raises ValueError where there is none, or a damaged one."""
 
     @property
     @abstractmethod
@@ -157,7 +171,8 @@ class RecordedFamily(Immutable, ABC):
         if onset is None:
             begin = max(self.log.start, self.log.fixes.time[0])
             onset = begin + (time[-1] - begin) / 3.0
-            onset = min(max(onset, time[0]), time[-2])
+            latest = self.recorded_spoof().begin - LEAD if self.attacked else time[-2]
+            onset = min(max(min(onset, latest), time[0]), time[-2])
         if not time[0] <= onset < time[-1]:
             raise ValueError(
                 f"scenario {self.name!r}: onset {seconds(onset)} s lies outside the log: valid from "
@@ -255,14 +270,9 @@ class RecordedFamily(Immutable, ABC):
         """The part of `model` from an epoch to the end of the game, begun from the clean run's filter."""
         stop, whole, clean = self.last + 1, self.model, self.clean
         return replace(
-            whole,
-            time=whole.time[first:stop],
-            boundaries=whole.boundaries[first : stop + 1],
-            fix_position=whole.fix_position[first:stop],
-            fix_velocity=whole.fix_velocity[first:stop],
+            whole.part(first, stop),
             true_position=self.true_position[first:stop],
             true_velocity=self.true_velocity[first:stop],
-            measurement_covariance=whole.measurement_covariance[first:stop],
             attitude=clean.attitude[first],
             velocity=clean.velocity[first],
             position=clean.position[first],

@@ -16,6 +16,8 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.logs.range_epochs import RangeEpochs
+from spoofgym.logs.spoofed_fixes import RecordedSpoof
+from spoofgym.logs.spoofed_ranges import spoofed_within
 from spoofgym.logs.table import seconds
 from spoofgym.navigation.divergence import Solution
 from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION
@@ -59,6 +61,7 @@ class RecordedRanges(RecordedFamily, RangeFamily):
         "different clocks (imu_delay_s), a wrong mounting (imu_to_body_frd), an IMU that is worse than its grade"
     )
     offers = RangeFamily.offers
+    kind = TightReplayNavigator
 
     epochs: RangeEpochs
     errors: RangeErrors = ERRORS
@@ -76,17 +79,21 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     @property
     def facts(self) -> FilterFacts:
         """What the designer of the filter knows."""
-        return replace(super().facts, range_model=self.tight_model)
+        return replace(super().facts, range_model=self.tight_model, observable="rate")
 
     @cached_property
     def ranges(self) -> RangeEpochs:
         """Those after the alignment, as far as IMU and reference reach.
+
+        Ranges that are spoofed themselves belong to the game of their attack alone.
 
         Raises:
             ValueError: too few.
         """
         start = int(self.epochs.fix[self.alignment.fix]) + 1
         stop = int(np.searchsorted(self.epochs.time, self._end, side="right"))
+        if self.spoofed_within and not self.attacked:  # nobody knows what the ranges would be without the attack
+            stop = min(stop, int(np.argmax(self.epochs.spoofed)))
         if stop - start < 4:
             raise ValueError(
                 f"scenario {self.name!r}: too few ranges after the alignment at {seconds(self.align_time)} s"
@@ -173,12 +180,19 @@ class RecordedRanges(RecordedFamily, RangeFamily):
             if self.log.reference is None or not self.compared.all():
                 position, velocity = self._known(0, run.position[1:]), self._known(1, run.velocity[1:])
                 run = self._clean_along(replace(self.model, true_position=position, true_velocity=velocity))
-        self._warn_of_large_innovations(run)
+        self._warn_of_large_innovations(self._unspoofed(run))
         return run
+
+    def _unspoofed(self, run: TightCleanRun) -> TightCleanRun:
+        """The innovations of a run as far as the log's own ranges are those of no attack."""
+        if not self.spoofed_within:
+            return run
+        stop = int(np.searchsorted(self.epoch_time, self.recorded_spoof().begin))
+        return replace(run, nis=run.nis[:stop], degrees=run.degrees[:stop])
 
     def _clean_along(self, model: StrapdownModel) -> TightCleanRun:
         satellites, unknown = self.ranges.geometry.position, np.zeros(len(self.epoch_time))
-        tight = _bare(self.dynamics, self._cold)
+        tight = bare_model(self.dynamics, self._cold)
         navigator = TightReplayNavigator(model, tight, satellites, unknown, 1, RunSlices(1))
         return tight_clean_run(navigator, self.deviation(model.true_position, model.true_velocity))
 
@@ -186,6 +200,29 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     def _measured(self) -> Floats:
         """Deviation of the ranges from those of the truth, (E, m)."""
         return self.deviation(self.true_position, self.true_velocity)
+
+    @property
+    def spoofed_within(self) -> bool:
+        """Whether the log's own ranges are spoofed at some time."""
+        return bool(self.epochs.spoofed.any() and spoofed_within(self.log))
+
+    def recorded_spoof(self) -> RecordedSpoof:
+        """The real attack that the log holds on its ranges.
+
+        Raises:
+            ValueError: it holds none.
+        """
+        ranges, time = self.epochs, self.epochs.time
+        during = np.flatnonzero(ranges.spoofed)
+        if not len(during):
+            raise ValueError(
+                f"log {str(self.log.folder)!r}: attack recorded: it holds none on its ranges, neither "
+                "ranges_spoofed.csv nor first_effect_s in log.toml"
+            )
+        begin, end = float(time[during[0]]), float(time[during[-1]])
+        lasts = self.spoofed_within and during[-1] == len(time) - 1
+        nothing = np.zeros((len(time), 3))
+        return RecordedSpoof(time, nothing, nothing, begin, np.inf if lasts else end, ranges.added)
 
     def _dynamics(self, burn_in: int) -> TightDynamics:
         return self.dynamics.part(self._first(burn_in), self.last + 1)
@@ -195,9 +232,9 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     ) -> TightReplayNavigator:
         """A navigator that starts from the clean run's filter before epoch -burn_in; arguments as in `FilterFamily`."""
         first, stop = self._first(burn_in), self.last + 1
-        tight = _bare(self._dynamics(burn_in), self.clean.covariance[first])
+        tight = bare_model(self._dynamics(burn_in), self.clean.covariance[first])
         satellites, clock = self.ranges.geometry.position[first:stop], self.clean.state[first + 1 : stop + 1, CLOCK]
-        return TightReplayNavigator(self._game_model(first), tight, satellites, clock, num_runs, slices, demands)
+        return self.kind(self._game_model(first), tight, satellites, clock, num_runs, slices, demands)
 
     @kept_by_burn_in
     def tight_model(self, burn_in: int = 0) -> TightModel:
@@ -261,7 +298,7 @@ class RecordedRanges(RecordedFamily, RangeFamily):
         return self.ranges.geometry.satellite[self._first(burn_in) + index]
 
 
-def _bare(dynamics: TightDynamics, prior: Floats) -> TightModel:
+def bare_model(dynamics: TightDynamics, prior: Floats) -> TightModel:
     """The model as a navigator at the IMU rate takes it, which forms all covariances itself."""
     nothing = np.empty((0, 0, 0))
     return TightModel(dynamics, prior, nothing, nothing, nothing, nothing, nothing)

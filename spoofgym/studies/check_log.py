@@ -6,6 +6,7 @@ import argparse
 import sys
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,16 @@ import numpy as np
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.logs.checks.check import all_findings
 from spoofgym.logs.checks.finding import Finding
+from spoofgym.logs.checks.resting import is_resting
 from spoofgym.logs.log_warning import LogWarning
 from spoofgym.program import USAGE, do_all, give_json, moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
+from spoofgym.scenarios.recorded_resting import SIMULATED
 
 EXAMPLES = ("spoofgym check-log runs/flight", "spoofgym check-log runs/flight --json runs/faults.json")
+GRADE = "tactical"
+"""Of the IMU that is simulated where an antenna rests and the log has none."""
 FILTER = "clean run"
 """What the findings of the filter are about."""
 
@@ -46,12 +51,17 @@ def _row(finding: Finding) -> dict[str, Any]:
     return {**vars(finding), "told": str(finding)}
 
 
+def _imu(folder: str) -> str:
+    """The option of a log that has no IMU."""
+    return f",imu={SIMULATED}:{GRADE}" if is_resting(Path(folder)) else ""
+
+
 def _clean_run(folder: str) -> tuple[dict[str, Any] | None, list[Finding]]:
     """Figures of the filter on a log without an attack, and what it warns of or why it cannot run."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
-            family = recorded_family(make_scenario(f"recorded:{folder}"))
+            family = recorded_family(make_scenario(f"recorded:{folder}{_imu(folder)}"))
             run, first = family.clean, int(np.searchsorted(family.epoch_time, family.align_time + SETTLING))
             first = first if first < len(family.epoch_time) else 0
             clean = {

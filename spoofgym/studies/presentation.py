@@ -95,7 +95,8 @@ def recorded_table(report: dict[str, Any]) -> Table:
         caption=f"{report['alignment']}\n"
         "clean: horizontal error, normalised innovation squared, alarms and epochs without an attack; then the "
         "time to detect the attack, the error at the alarm, and the largest one if every fix is used"
-        + ("; alarms later, back: after the last spoofed fix" if _ends(report) else ""),
+        + ("; alarms later, back: after the last spoofed fix" if _ends(report) else "")
+        + ("; after pull: from its beginning to an alarm" if _pulls(report) else ""),
         box=None,
         padding=(0, 2, 0, 0),
     )
@@ -113,7 +114,8 @@ def recorded_table(report: dict[str, Any]) -> Table:
     ):
         table.add_column(title, justify="right", no_wrap=True)
     ends = _ends(report)
-    for title in ("alarms\nlater", "back\ns") if ends else ():
+    further = ("alarms\nlater", "back\ns") if ends else ()
+    for title in (*further, *(("after\npull s",) if _pulls(report) else ())):
         table.add_column(title, justify="right", no_wrap=True)
     for row in report["rows"]:
         later = (number(row["alarms_after_end"], "d"), number(row["recovery_s"], ".1f")) if ends else ()
@@ -129,8 +131,14 @@ def recorded_table(report: dict[str, Any]) -> Table:
             number(row["error_at_detection_m"]),
             number(row["max_error_m"]),
             *later,
+            *((number(row["alarm_after_pull_s"], ".1f"),) if _pulls(report) else ()),
         )
     return table
+
+
+def _pulls(report: dict[str, Any]) -> bool:
+    """Whether an attack of a ``"recorded"`` report states when its pull begins, and somebody alarms then."""
+    return any(row["alarm_after_pull_s"] is not None for row in report["rows"])
 
 
 def _ends(report: dict[str, Any]) -> bool:

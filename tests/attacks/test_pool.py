@@ -148,6 +148,7 @@ REQUIRED = {
     "position-only": ":ramp:1/direction=0",
     "liu-spoofer": ":1",
     "partial": ":ramp:1/direction=0",
+    "code-only": ":ramp:1/direction=0",
 }
 
 

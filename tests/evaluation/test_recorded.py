@@ -25,6 +25,8 @@ KEYS = [
     "clean_epochs",
     "detected",
     "time_to_detect_s",
+    "alarms_before_onset",
+    "alarm_after_pull_s",
     "error_at_detection_m",
     "max_error_m",
     "error_epochs",

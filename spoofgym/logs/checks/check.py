@@ -13,12 +13,16 @@ from spoofgym.logs.checks.finding import Finding
 from spoofgym.logs.checks.fixes import check_fixes, check_status, check_zero_velocity
 from spoofgym.logs.checks.inertial import check_inertial, check_sample_times
 from spoofgym.logs.checks.ranges import check_ranges
+from spoofgym.logs.checks.resting import is_resting, resting_findings
 from spoofgym.logs.checks.times import check_fix_times, check_steps
 from spoofgym.logs.checks.turning import check_turning
 from spoofgym.logs.checks.velocity import check_velocity
 from spoofgym.logs.log import Log, Tables, as_fixes, log_of, read_tables
 from spoofgym.logs.log_warning import LogWarning, warn
 from spoofgym.logs.reference import checked_reference
+
+ORDER = {"error": 0, "warning": 1, "note": 2}
+"""In which findings are told."""
 
 
 def checked_log(folder: str | Path) -> Log:
@@ -86,6 +90,8 @@ def all_findings(folder: str | Path) -> list[Finding]:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
+            if is_resting(folder):
+                return sorted([*resting_findings(folder)], key=lambda finding: ORDER[finding.severity])
             tables = read_tables(folder)
             found += table_findings(tables)
             log = log_of(tables)
@@ -94,8 +100,7 @@ def all_findings(folder: str | Path) -> list[Finding]:
         except ValueError as error:
             found.append(Finding("error", folder.name, str(error)))
     warned = [Finding("warning", folder.name, str(each.message)) for each in told if each.category is LogWarning]
-    order = {"error": 0, "warning": 1, "note": 2}
-    return sorted(found + warned, key=lambda finding: order[finding.severity])
+    return sorted(found + warned, key=lambda finding: ORDER[finding.severity])
 
 
 def file_findings(folder: Path) -> Iterator[Finding]:

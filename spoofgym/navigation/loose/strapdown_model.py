@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -85,6 +85,12 @@ class StrapdownModel(Immutable):
     def num_epochs(self) -> int:
         """K."""
         return len(self.time) - 1
+
+    def part(self, first: int, stop: int) -> StrapdownModel:
+        """Epochs first..stop-1, with all samples and the start of the whole."""
+        by_epoch = ("time", "fix_position", "fix_velocity", "true_position", "true_velocity", "measurement_covariance")
+        cut = {name: getattr(self, name)[first:stop] for name in by_epoch}
+        return replace(self, boundaries=self.boundaries[first : stop + 1], **cut)
 
     @cached_property
     def steps(self) -> StrapdownSteps:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.error_batch import LinearErrorBatch
 from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.tight.code_errors import CodeErrors
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tight.states import BIAS, CLOCK
 from spoofgym.navigation.tight.truth import ErrorRuns
@@ -42,6 +43,7 @@ class TightErrorBatch(LinearErrorBatch):
         self.model = model
         self.normals = np.zeros((num_runs, model.num_epochs + 1, n))
         self._runs = ErrorRuns(self.index, self.state, self.true_bias, self.normals)
+        self._code_errors = CodeErrors(model, num_runs)
 
     def reset(self, runs: Runs, initial: Floats, streams: RunStreams) -> None:
         """Start new episodes just before epoch 0.
@@ -54,6 +56,7 @@ class TightErrorBatch(LinearErrorBatch):
         super().reset(runs, initial, streams)
         n = self.state.shape[1]
         self.state[runs] = initial[:, :n]
+        self._code_errors.begin(runs, initial)
         self.true_bias[runs] = initial[:, n:] + initial[:, BIAS]
         for run in runs.tolist():
             streams(run, "imu").standard_normal(out=self.normals[run])
@@ -62,6 +65,11 @@ class TightErrorBatch(LinearErrorBatch):
     def clock_error(self) -> Floats:
         """Estimate minus truth of the receiver's clock, (N,), m."""
         return self.state[:, CLOCK].copy()
+
+    @property
+    def measured(self) -> Floats:
+        """Code and second observable as they were measured, (N, m), m and m/s; see `RangeNavigator.measured`."""
+        return self._deviation + self._code_errors.added(self.index, self.normals)
 
 
 def at_epochs(table: NDArray[Kind], rows: Runs) -> NDArray[Kind]:

@@ -95,6 +95,7 @@ class TightFamily(RangeFamily):
             self.offers,
             self.linear_model,
             range_model=self.tight_model,
+            observable=self.observable,
             matched=self.matched,
         )
 

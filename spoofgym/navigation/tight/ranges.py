@@ -81,7 +81,9 @@ def captured_ranges(present: Flags, spoof: Spoof, code: Floats, second: Floats) 
         second: what it adds to each second observable, (k, S), m or m/s.
     """
     captured = present if spoof.satellites is None else present & spoof.satellites
-    return np.concatenate([code * captured, second * captured], axis=1)
+    followed = captured if spoof.carrier is None else captured & spoof.carrier[:, None]
+    added = np.concatenate([code * captured, second * followed], axis=1)
+    return added if spoof.ranges is None else added + spoof.ranges
 
 
 def disturbed_ranges(direction: Floats, multipath: Floats) -> Floats:

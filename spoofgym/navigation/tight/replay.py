@@ -52,3 +52,8 @@ class TightReplayNavigator(TightStrapdownNavigator):
     def clock_error(self) -> Floats:
         """Estimate minus reference of the receiver's clock, (N,), m."""
         return self.state[:, CLOCK] - self._clock[self.index]
+
+    @property
+    def measured(self) -> Floats:
+        """Code and range rate of the log less those of the reference, (N, m), m and m/s."""
+        return self._deviation.copy()

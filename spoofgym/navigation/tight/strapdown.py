@@ -17,6 +17,7 @@ from spoofgym.navigation.interface import NO_DEMANDS, Demands
 from spoofgym.navigation.loose.inertial import InertialBatch
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
 from spoofgym.navigation.tight import kernels
+from spoofgym.navigation.tight.code_errors import CodeErrors
 from spoofgym.navigation.tight.kalman import RangeInnovations
 from spoofgym.navigation.tight.model import TightDynamics, TightModel
 from spoofgym.navigation.tight.own_covariances import TightOwnCovariances
@@ -70,6 +71,7 @@ class TightStrapdownNavigator(TightOwnCovariances, InertialBatch):
         self.range_normals = np.zeros((num_runs, tight.num_epochs + 1, n))
         self._response = np.zeros((num_runs, m, 3))
         errors = ErrorRuns(self.index, self.state, self.true_bias, self.range_normals)
+        self._code_errors = CodeErrors(tight, num_runs)
         self._vehicles = kernels.Vehicles(errors, self._inertial, self._fix, self._normals)
         # the true bias goes back, too: the stored noise then carries it forward to the same bits
         self.past = History(
@@ -85,6 +87,7 @@ class TightStrapdownNavigator(TightOwnCovariances, InertialBatch):
         super().reset(runs, initial, streams)
         n = self.state.shape[1]
         self.state[runs] = initial[:, :n]
+        self._code_errors.begin(runs, initial)
         self.state[runs, INERTIAL] = 0.0
         self.bias[runs] = initial[:, n:]
         self.true_bias[runs] = initial[:, n:] + initial[:, BIAS]
@@ -138,3 +141,8 @@ class TightStrapdownNavigator(TightOwnCovariances, InertialBatch):
     def clock_error(self) -> Floats:
         """Estimate minus truth of the receiver's clock, (N,), m."""
         return self.state[:, CLOCK].copy()
+
+    @property
+    def measured(self) -> Floats:
+        """Code and second observable as they were measured, (N, m), m and m/s; see `RangeNavigator.measured`."""
+        return self._deviation + self._code_errors.added(self.index, self.range_normals)

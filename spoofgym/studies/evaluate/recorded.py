@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -26,6 +27,9 @@ from spoofgym.evaluation.report import recorded_report
 from spoofgym.program import last_of, program
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+from spoofgym.scenarios.clean_scene import clean_scene
+from spoofgym.scenarios.recorded_family import recorded_family
+from spoofgym.specification import Specification
 from spoofgym.studies.departure_presentation import departures_tables
 from spoofgym.studies.giving import Output, give
 from spoofgym.studies.presentation import recorded_figure, recorded_table
@@ -49,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
     add("log", metavar="FOLDER", help="of the log, and options after it: FOLDER,noise_factor=3")
     add("--detector", action="append", help="the monitor; repeat it for several at once (default: snapshot)")
     add("--attack", action="append", metavar="SPEC",
-        help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: ramp:0.5)")
+        help="an attack, e.g. ramp:0.5 or policy:FOLDER; repeatable (default: ramp:0.5, or the log's own)")
     add("--p-fa", type=share_of_alarms, metavar="P",
         help="set every threshold to this share of alarms in the clean log, per epoch (default: as the detector says)")
     add_seed(result, "what an attack draws; nothing else on a log is drawn")
@@ -80,14 +84,24 @@ def recorded_log(text: str) -> Scenario:
     return make_scenario(text if text.startswith(f"{RECORDED}:") else f"{RECORDED}:{text}")
 
 
+def _attacked(scenario: Scenario, attacks: Sequence[str]) -> Scenario:
+    """The scenario with ``attack=recorded`` where its own ranges are spoofed and that attack is asked for."""
+    family = recorded_family(scenario)
+    if RECORDED not in attacks or family.attacked or not family.spoofed_within:
+        return scenario
+    given = Specification.parse(scenario.name)
+    return make_scenario(str(replace(given, options={**given.options, "attack": RECORDED})))
+
+
 def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
-    scenario = recorded_log(options.log)
+    scenario = _attacked(recorded_log(options.log), options.attack or [])
+    usual = RECORDED if recorded_family(scenario).attacked else "ramp:0.5"
     detectors = [make_detector(name) for name in options.detector or ["snapshot"]]
     if options.p_fa is not None:
-        ready = at_false_alarm_probability([scenario], detectors, options.p_fa)
+        ready = at_false_alarm_probability([clean_scene(scenario)], detectors, options.p_fa)
     else:
         ready = calibrated_for_play(detectors, scenario, scenario.fidelities[0])
-    attacks = [make_spoofer(text) for text in options.attack or ["ramp:0.5"]]
+    attacks = [make_spoofer(text) for text in options.attack or [usual]]
     return last_of(_reports(scenario, attacks, ready, options.seed, progress))
 
 
