@@ -78,6 +78,15 @@ class CleanRun:
         per_degree, degrees = self.nis_per_degree(first), float(self.degrees[first:].sum())
         return bool(per_degree > LARGEST_NIS and per_degree * degrees > chi2.isf(CHANCE, degrees))
 
+    def told(self, first: int) -> str:
+        """How large innovations from an epoch on are, to the largest of them, for a message."""
+        per_degree = self.nis_per_degree(first)
+        return (
+            f"clean innovations are {np.sqrt(per_degree):.1f} times as large as the filter believes: mean NIS "
+            f"{np.mean(self.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; "
+            f"the largest is {self.nis[first:].max():.3g}"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class TightCleanRun(CleanRun):

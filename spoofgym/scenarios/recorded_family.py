@@ -303,16 +303,9 @@ class RecordedFamily(Immutable, ABC):
         settled = int(np.searchsorted(self.epoch_time, self.align_time + SETTLING))
         first = settled if settled < len(self.epoch_time) else 0
         if run.is_doubtful(first):
-            per_degree = run.nis_per_degree(first)
-            worst = first + int(np.argmax(run.nis[first:]))
-            time = float(self.epoch_time[worst])
-            warn(
-                self.log.folder,
-                f"clean innovations are {np.sqrt(per_degree):.1f} times as large as the filter believes: mean NIS "
-                f"{np.mean(run.nis[first:]):.3g}, {per_degree:.3g} per degree of freedom, where 1 or less is right; "
-                f"the largest is {run.nis[worst]:.3g} at {seconds(time)} s"
-                f"{self.log.fixes.line(time)}; likely reasons: {self.doubts}",
-            )
+            time = float(self.epoch_time[first + int(np.argmax(run.nis[first:]))])
+            place = f"{seconds(time)} s{self.log.fixes.line(time)}"
+            warn(self.log.folder, f"{run.told(first)} at {place}; likely reasons: {self.doubts}")
 
     @cached_property
     def true_position(self) -> Floats:
