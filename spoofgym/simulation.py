@@ -16,7 +16,8 @@ from spoofgym.clean_starts import far_too_low, require_clean_starts
 from spoofgym.detectors.base import Detector, statistic_of
 from spoofgym.fitting import fit_attack, fit_detectors, fit_response
 from spoofgym.navigation.divergence import diverged_error
-from spoofgym.navigation.interface import NO_DEMANDS, Clock, Decision, Demands, Epoch, FilterView, Innovation, Spoof
+from spoofgym.navigation.interface import NO_DEMANDS, Clock, Decision, Demands, Epoch, FilterView, Innovation
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.white import white_epochs
 from spoofgym.parallel import RunSlices
 from spoofgym.responses.base import Response
@@ -351,14 +352,13 @@ class Simulation:
         moved = given[:, 3] if given.shape[1] == 4 else self._no_offset[:, 0]
         if attack is not None:
             moved = attack.clock_offset(clock)
-        rate = (offset - self.offset) / intervals[:, None]
+        rate, pull = (offset - self.offset) / intervals[:, None], (moved - self.clock_offset) / intervals
         satellites = carrier = ranges = None
         if attack is not None:
             rate = attack.velocity(clock, rate)
             if self._family.slots:
                 slots = self._family.satellites(clock.index + self.burn_in, self.burn_in)
                 satellites, carrier, ranges = attack.captured(clock, slots), attack.carrier(clock), attack.ranges(clock)
-        pull = (moved - self.clock_offset) / intervals
         return Spoof(offset.copy(), rate, moved.copy(), pull, satellites, carrier, ranges)
 
     @property

@@ -9,9 +9,10 @@ from typing import Protocol
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.navigation.facts import FilterFacts
-from spoofgym.navigation.interface import Demands, Innovation, Navigator, Spoof
+from spoofgym.navigation.interface import Demands, Innovation, Navigator
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.mean import MeanFilter
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices
 from spoofgym.streams import RunStreams

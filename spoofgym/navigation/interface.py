@@ -119,29 +119,6 @@ class Epoch(Clock):
 
 
 @dataclass(frozen=True)
-class Spoof:
-    """What a spoofer makes the receivers believe at an epoch.
-
-    Attributes:
-        offset: of the position, (N, 3), m ENU.
-        rate: what is added to the velocity, (N, 3), m/s ENU; its own rate in a consistent attack.
-        clock: offset of the receiver's clock, (N,), m. A receiver of fixes solves for its clock and does not show it.
-        clock_rate: its rate, (N,), m/s.
-        satellites: slots whose signal the receiver takes from the spoofer, (N, S); None = all.
-        carrier: whether the carrier, and with it the range rate, follows the code, (N,); None = in every run.
-        ranges: what a recorded attack adds to each range beside, (N, m), m and m/s; None = nothing.
-    """
-
-    offset: Floats
-    rate: Floats
-    clock: Floats
-    clock_rate: Floats
-    satellites: Flags | None = None
-    carrier: Flags | None = None
-    ranges: Floats | None = None
-
-
-@dataclass(frozen=True)
 class Decision:
     """What becomes of the present fix.
 
@@ -322,11 +299,7 @@ class RangeNavigator(Navigator, Protocol):
 
     @property
     def measured(self) -> Floats:
-        """Code and second observable of the present epoch as they were measured, (N, m), m and m/s.
-
-        Less what both share, up to a constant of each satellite: geometry, clocks, troposphere. So their difference,
-        code minus carrier, is that of the raw measurements, and nothing else of them is of use.
-        """
+        """Code and second observable as they were measured, less geometry and clocks, which both share, (N, m)."""
 
 
 class FilterView:

@@ -46,8 +46,7 @@ class RecordedFamily(Immutable, ABC):
         log: the recording; its fixes are those that the alignment takes.
         grade: of the IMU, as the filter believes.
         tuning: what the filter believes beside it.
-        onset: latest time of epoch 0, the last clean epoch, s; None = a third of the way from the log's start to its
-            end.
+        onset: latest time of epoch 0, the last clean epoch, s; None = a third of the way into the log.
         horizon: epochs of the game; None = to the end of the log.
         attacked: whether the game is the attack that the log holds, and begins before it.
         doubts: what is likely wrong with a log on which the filter is bad.
@@ -120,7 +119,7 @@ class RecordedFamily(Immutable, ABC):
 
     @abstractmethod
     def recorded_spoof(self) -> RecordedSpoof:
-        """The real attack that the log holds; raises ValueError where there is none, or a damaged one."""
+        """The real attack that the log holds; raises ValueError where there is none."""
 
     @property
     @abstractmethod

@@ -22,10 +22,11 @@ from spoofgym.logs.table import seconds
 from spoofgym.navigation.divergence import Solution
 from spoofgym.navigation.error_model import NUM_INERTIAL, NUM_NAVIGATION
 from spoofgym.navigation.facts import FilterFacts
-from spoofgym.navigation.interface import Demands, Spoof
+from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.linear_model import ErrorDynamics
 from spoofgym.navigation.loose.kernels import mechanize_part
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.tight.model import TightDynamics, TightModel, cold_covariance, tight_dynamics, tight_model
 from spoofgym.navigation.tight.ranges import RangeFamily, along, captured_ranges, disturbed_ranges
 from spoofgym.navigation.tight.replay import TightReplayNavigator

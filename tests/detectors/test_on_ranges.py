@@ -65,6 +65,10 @@ def test_every_detector_runs_on_ranges_or_is_refused(name):
         detector = patient(f"{name}:{'weight=0.1' if 'ewma' in name else 'windows=5+10'}")
     if name == "code-minus-carrier":
         detector = patient(f"{name}:n=5")  # both windows fill within the game
+    if name == "aid-innovation":
+        with pytest.raises(ValueError, match=rf"detector '{name}' needs .*, which scenario 'kujur-flight"):
+            Simulation(FLIGHT, None, [detector])
+        return
     if LINEAR_MODEL in detector.needs:
         with pytest.raises(ValueError, match=rf"detector '{name}.*' needs linear model, which scenario 'kujur-flight"):
             Simulation(FLIGHT, None, [detector])

@@ -12,7 +12,8 @@ from spoofgym.arrays import Floats
 from spoofgym.envs.config import SpooferConfig
 from spoofgym.envs.spoofer import SpooferEnv
 from spoofgym.envs.spoofer_game import SpooferGame
-from spoofgym.navigation.interface import Decision, Demands, Spoof
+from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.tight.mean import TightMeanFilter
 from spoofgym.navigation.tight.shared_gains import TightNavigator
 from spoofgym.parallel import RunSlices

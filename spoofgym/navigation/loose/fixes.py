@@ -9,10 +9,11 @@ import numpy as np
 from spoofgym.arrays import Floats, Runs
 from spoofgym.immutable import Immutable
 from spoofgym.navigation.error_model import NUM_INERTIAL
-from spoofgym.navigation.interface import Innovation, Spoof
+from spoofgym.navigation.interface import Innovation
 from spoofgym.navigation.linear_model import LinearModel
 from spoofgym.navigation.loose.mean import LooseMeanFilter
 from spoofgym.navigation.mean import MeanFilter
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.white import WhiteInnovations
 from spoofgym.parallel import RunSlices
 

@@ -12,9 +12,10 @@ from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.geodesy import displace, geodetic_to_ecef
 from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.family import FIDELITIES
-from spoofgym.navigation.interface import Demands, Navigator, Spoof
+from spoofgym.navigation.interface import Demands, Navigator
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
 from spoofgym.navigation.loose.strapdown_model import strapdown_model
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.tight.model import (
     TightDynamics,
     TightModel,

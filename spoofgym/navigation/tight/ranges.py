@@ -9,8 +9,9 @@ import numpy as np
 from spoofgym.arrays import Flags, Floats
 from spoofgym.immutable import Immutable
 from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES
-from spoofgym.navigation.interface import Innovation, Spoof
+from spoofgym.navigation.interface import Innovation
 from spoofgym.navigation.mean import MeanFilter
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.tight.mean import TightMeanFilter
 from spoofgym.navigation.tight.model import TightModel
 from spoofgym.navigation.tight.states import num_states

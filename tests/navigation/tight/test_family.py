@@ -6,7 +6,8 @@ import pytest
 
 from spoofgym.detectors import make_detector
 from spoofgym.geodesy import displace, geodetic_to_ecef
-from spoofgym.navigation.interface import Demands, Spoof
+from spoofgym.navigation.interface import Demands
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.scenarios import make_scenario
 from spoofgym.sensors.confounders import Confounders, Disturbances
 from spoofgym.simulation import Simulation

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from spoofgym.navigation.interface import Decision, Demands, Spoof
+from spoofgym.navigation.interface import Decision, Demands
+from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.tight.tracking_response import projected_response, tracking_response
 from spoofgym.parallel import RunSlices
 from spoofgym.scenarios import make_scenario
