@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -72,3 +73,10 @@ def fit_response(owner: str, response: Response, scenario: Scenario, num_runs: i
     scenario.facts.require(f"response {response.name!r}", response.needs)
     response.know(scenario.facts)
     response.bind(num_runs)
+
+
+def join(simulation: Any, *players: Attack | Detector | Response | None) -> None:
+    """Give players the simulation that they play in, when it has been set up; None is nobody."""
+    for player in players:
+        if player is not None:
+            player.join(simulation)

@@ -14,7 +14,7 @@ from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.attacks.base import Attack
 from spoofgym.clean_starts import far_too_low, require_clean_starts
 from spoofgym.detectors.base import Detector, statistic_of
-from spoofgym.fitting import fit_attack, fit_detectors, fit_response
+from spoofgym.fitting import fit_attack, fit_detectors, fit_response, join
 from spoofgym.navigation.divergence import diverged_error
 from spoofgym.navigation.interface import NO_DEMANDS, Clock, Decision, Demands, Epoch, FilterView, Innovation
 from spoofgym.navigation.spoof import Spoof
@@ -126,11 +126,10 @@ class Simulation:
         self.alarm: NDArray[np.bool_] = np.zeros(num_runs, dtype=bool)
         self.epoch = self._blank_epoch()
         self.steering = scenario.steering(num_runs)
-        for player in (attack, response):
-            if player is not None:
-                player.join(self)
+        join(self, attack, response)
         if scenario.random:
             require_clean_starts(scenario.name, list(self.detectors.values()), self._passing)
+        join(self, *detectors)
 
     def _blank_epoch(self) -> Epoch:
         n, innovation = self.num_runs, self._family.blank_innovation(self.num_runs)
@@ -213,7 +212,8 @@ class Simulation:
         initial = self._family.draw_initial(runs, self.burn_in, self.streams)
         self._noise[runs] = self._family.draw_receiver_noise(runs, initial, self.burn_in, self.streams)
         if self.confounders is not None:
-            self._noise[runs, self.burn_in :] += self._family.disturbed(self.confounders.noise[runs], self.burn_in)
+            noise, clock = self.confounders.noise[runs], self.confounders.clock[runs]
+            self._noise[runs, self.burn_in :] += self._family.disturbed(noise, self.burn_in, clock)
         self.navigator.reset(runs, initial, self.streams)
         alarmed = np.zeros(len(runs), dtype=bool)
         for epoch in self._white_epochs(runs):
@@ -339,11 +339,10 @@ class Simulation:
         if not self._holds:
             self.require_converged()
         available = self._available(clock.index, innovation)
-        epoch = Epoch(clock.index, clock.time, innovation, available=available, view=self._view(self._all))
-        self.alarm = self._test(epoch, self.detectors)
-        self.epoch = epoch
+        self.epoch = Epoch(clock.index, clock.time, innovation, available=available, view=self._view(self._all))
+        self.alarm = self._test(self.epoch, self.detectors)
         self._decide()
-        return epoch
+        return self.epoch
 
     def _spoof(self, clock: Clock, attack: Attack | None, given: Floats) -> Spoof:
         """What the receiver is made to believe at an epoch: by the attack, or by offsets from outside."""
@@ -365,7 +364,8 @@ class Simulation:
     def attacked(self) -> Flags:
         """Whether the present fix is spoofed, (N,)."""
         moved, attack = np.asarray(self.offset.any(axis=1) | (self.clock_offset != 0.0)), self.attack
-        return moved | attack.active(self.epoch) if attack is not None and attack.on_ranges else moved
+        elsewhere = attack is not None and (attack.on_ranges or not attack.moves_position)
+        return moved | attack.active(self.epoch) if attack is not None and elsewhere else moved
 
     def _available(self, index: Runs, innovation: Innovation) -> Flags:
         """Whether there is a fix in each run, (N,); where there is none, nobody sees an innovation."""

@@ -14,7 +14,10 @@ import numpy as np
 
 from spoofgym import validation
 
-PURPOSES = ("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders", "defender", "aids")
+PURPOSES = (
+    *("initial", "imu", "receiver", "tracking", "opponent", "memory", "confounders", "defender", "aids", "rare events"),
+    "receiver flag",
+)
 
 
 class RunStreams:

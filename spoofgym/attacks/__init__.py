@@ -29,7 +29,9 @@ from spoofgym.attacks.position_only import PositionOnly
 from spoofgym.attacks.profiles import Jump, JumpRamp, NoAttack, Ramp, SlowChange
 from spoofgym.attacks.range_attack import LiuSpoofer
 from spoofgym.attacks.song_mix import SongMix
+from spoofgym.attacks.time_only import TimeOnly
 from spoofgym.attacks.tracking_error import SIGMA, TrackingError
+from spoofgym.attacks.velocity_only import VelocityOnly
 from spoofgym.specification import build, unnest
 
 Inside = Callable[[str], Attack]
@@ -66,6 +68,14 @@ def _around(make: Inside) -> dict[str, Callable[..., Attack]]:
         """
         return PositionOnly(inside("position-only", attack))
 
+    def velocity_only(attack: str) -> Attack:
+        """Another attack that spoofs the velocity of a fix and leaves its position as it is.
+
+        Args:
+            attack: the other one; "/" stands for its commas.
+        """
+        return VelocityOnly(inside("velocity-only", attack))
+
     def partial(attack: str, satellites: int | None = None, numbers: str | None = None) -> Attack:
         """Another attack that captures some satellites only.
 
@@ -87,6 +97,7 @@ def _around(make: Inside) -> dict[str, Callable[..., Attack]]:
     return {
         "tracking-error": tracking_error,
         "position-only": position_only,
+        "velocity-only": velocity_only,
         "partial": partial,
         "code-only": code_only,
     }
@@ -107,6 +118,7 @@ ATTACKS: dict[str, Callable[..., Attack]] = {
     "noise-matched": NoiseMatched,
     "azimuth": Azimuth,
     "liu-spoofer": LiuSpoofer,
+    "time-only": TimeOnly,
     **FOI_ATTACKS,
     "random-ramp": RandomRamp,
     "random-jump": RandomJump,

@@ -30,6 +30,7 @@ class AroundAttack(Attack):
         self.needs_model = attack.needs_model
         self.needs_velocity = attack.needs_velocity
         self.needs_ranges = attack.needs_ranges
+        self.moves_position = attack.moves_position
         self.closed_loop = attack.closed_loop
         self.knowledge = attack.knowledge
         self.has_tracking_error = attack.has_tracking_error

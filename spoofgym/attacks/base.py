@@ -30,6 +30,7 @@ class Attack(ABC):
         needs_model: whether it must `study` the victim's filter.
         needs_velocity: whether the receiver must give velocity, too.
         needs_ranges: whether the filter must take ranges.
+        moves_position: whether it moves the position of a fix; otherwise it moves its velocity or its time alone.
         closed_loop: whether its offsets depend on what happens in the game, so that they cannot be told in advance.
         knowledge: what it sees while it plays, one of `KNOWLEDGE`.
         on_ranges: whether it acts on ranges as they are (`ranges`), or was recorded in them, so that `active` alone
@@ -42,6 +43,7 @@ class Attack(ABC):
     needs_model: bool = False
     needs_velocity: bool = False
     needs_ranges: bool = False
+    moves_position: bool = True
     closed_loop: bool = False
     knowledge: str = "blind"
     on_ranges: bool = False

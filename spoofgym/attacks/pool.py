@@ -62,6 +62,7 @@ class AttackPool(Attack):
         self.needs_model = any(member.needs_model for member in self._members)
         self.needs_velocity = any(member.needs_velocity for member in self._members)
         self.needs_ranges = any(member.needs_ranges for member in self._members)
+        self.moves_position = all(member.moves_position for member in self._members)
         self.names = tuple(member.name for member in self._members)
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"each attack can be in a pool once only, got {', '.join(self.names)}")
@@ -130,9 +131,18 @@ class AttackPool(Attack):
                 self.offsets[chosen] = attack.episode(chosen, streams)
         self.first[runs], self.last[runs] = spoofed_stretch(self.offsets[runs])
         for place, attack in enumerate(self._members):
+            chosen = runs[self.member[runs] == place]
             if attack.closed_loop:
-                chosen = runs[self.member[runs] == place]
                 self.first[chosen], self.last[chosen] = 1, self._timeline.num_epochs
+            elif not attack.moves_position:
+                self.first[chosen], self.last[chosen] = spoofed_stretch(self._activity(attack)[chosen])
+
+    def _activity(self, attack: Attack) -> Floats:
+        """Whether the receiver follows the spoofer at epochs 0..K, (N, K+1, 1)."""
+        everyone = np.ones(self._num_runs, dtype=np.int64)
+        times = enumerate(self._timeline.times.tolist())
+        active = [attack.active(Clock(k * everyone, time * everyone)) for k, time in times]
+        return np.stack(active, axis=1)[:, :, None].astype(np.float64)
 
     def active(self, clock: Clock) -> Flags:
         """Whether the receiver follows the spoofer, (N,): from the first offset of the episode to the last."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spoofgym.attacks import ATTACKS
+from spoofgym.attacks.recorded import NAME as RECORDED
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.envs.opponents import FITTED, make_spoofer
 from spoofgym.navigation.aids import AIDS
@@ -40,6 +41,7 @@ GIVEN = {
     "liu-spoofer": "liu-spoofer:0.2",
     "tracking-error": "tracking-error:ramp:0.2,sigma=0.3",
     "position-only": "position-only:ramp:0.2",
+    "velocity-only": "velocity-only:ramp:0.2",
     "partial": "partial:ramp:0.3,satellites=2",
     "code-only": "code-only:ramp:0.3",
     "unseen": "unseen:16",
@@ -113,6 +115,8 @@ class Part:
         if self.kind == "aids":
             return f"spoofgym play --scenario foi-drive:aids={self.example}"
         try:
+            if self.kind == "attacks" and _needs_a_log(self.example):
+                return f"spoofgym evaluate recorded FOLDER --attack {self.example}"
             place = next((text for text in PLACES if self._fits(text)), PLACES[0])
         except ValueError:  # one's own part that is spelled with a value which nobody can guess
             place = PLACES[0]
@@ -126,6 +130,11 @@ class Part:
         else:
             return not make_spoofer(self.example).needs_ranges or make_scenario(place).slots > 0
         return set(needs) <= set(make_scenario(place).offers)
+
+
+def _needs_a_log(attack: str) -> bool:
+    """Whether an attack needs a log's own attack, or a receiver that gives velocity, which no simulated one does."""
+    return attack == RECORDED or make_spoofer(attack).needs_velocity
 
 
 def part(kind: str, name: str) -> Part:
@@ -152,7 +161,7 @@ def part(kind: str, name: str) -> Part:
     text = tuple(paragraph for paragraph in (*rest, *paragraphs[1:]) if paragraph)
     return Part(
         kind, name, told.rstrip("."), text, _options(factory), _source([*paragraphs, *above]),
-        GIVEN.get(name, name), module,
+        name if (kind, name) == ("attacks", RECORDED) else GIVEN.get(name, name), module,
     )
 
 

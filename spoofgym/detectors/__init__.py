@@ -29,6 +29,7 @@ from spoofgym.detectors.mean_innovation import MeanInnovation
 from spoofgym.detectors.moving_average import FiniteMovingAverage
 from spoofgym.detectors.raim import Raim
 from spoofgym.detectors.ramp_bank import RampBank
+from spoofgym.detectors.receiver_flag import ReceiverFlag
 from spoofgym.detectors.relative_motion import RelativeMotion
 from spoofgym.detectors.rio import Rio
 from spoofgym.detectors.separation_bank import SeparationBank
@@ -107,6 +108,7 @@ DETECTORS: dict[str, Callable[..., Detector]] = {
     "raim": Raim,
     "clock-drift": ClockDrift,
     "code-minus-carrier": CodeMinusCarrier,
+    "receiver-flag": ReceiverFlag,
     "aid-innovation": AidInnovation,
     "ensemble": _ensemble,
 }

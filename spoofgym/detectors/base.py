@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,9 @@ class Detector(ABC):
         Raises:
             ValueError: the scenario does not fit.
         """
+
+    def join(self, simulation: Any) -> None:  # noqa: B027 - most tests do not look at the game that they watch
+        """Take the `Simulation` that the detector watches, when it has been set up and before its first episode."""
 
     def reset(self, runs: Runs) -> None:  # noqa: B027 - a snapshot has nothing to forget
         """Forget everything about these runs."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +65,11 @@ class Ensemble(ThresholdDetector):
             self.bind(*self._bound)
         for member in self.members:
             member.know(facts)
+
+    def join(self, simulation: Any) -> None:
+        """Give every member the simulation that it watches."""
+        for member in self.members:
+            member.join(simulation)
 
     def reset(self, runs: Runs) -> None:
         """Every member forgets these runs."""

@@ -119,12 +119,13 @@ class FilterFamily(Protocol):
             spoof: what the receivers are made to believe.
         """
 
-    def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
-        """What multipath adds to the measurements at epochs 0..K, (k, K+1, m), m and m/s.
+    def disturbed(self, multipath: Floats, burn_in: int, clock: Floats | None = None) -> Floats:
+        """What disturbances add to the measurements at epochs 0..K, (k, K+1, m), m and m/s.
 
         Args:
-            multipath: its effect on fixes of position, (k, K+1, 3), m ENU.
+            multipath: their effect on fixes of position, (k, K+1, 3), m ENU.
             burn_in: clean epochs before epoch 0.
+            clock: by how much the receiver has set its clock, (k, K+1), m; None = it has not.
         """
 
     def satellites(self, index: Runs, burn_in: int) -> Runs:

@@ -312,6 +312,11 @@ class FilterView:
         """Look at ``runs`` of a navigator; ``true_velocity``, (E, 3), of its model's epochs carries the estimate."""
         self._navigator, self._true_velocity, self._runs = navigator, true_velocity, runs
 
+    @property
+    def runs(self) -> Runs:
+        """Which runs of their simulation these are, (N,)."""
+        return self._runs
+
     @cached_property
     def velocity(self) -> Floats:
         """Estimated velocity, (N, 3), ENU, m/s."""

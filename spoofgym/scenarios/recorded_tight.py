@@ -290,9 +290,10 @@ class RecordedRanges(RecordedFamily, RangeFamily):
         rate = spoof.clock_rate[:, None] - along(geometry.line_of_sight[place], spoof.rate)
         return captured_ranges(geometry.present[place], spoof, code + spoof.clock[:, None], rate)
 
-    def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
-        """What multipath adds to the code at epochs 0..K, (k, K+1, m), so that a fix would err by ``multipath``."""
-        return disturbed_ranges(self.ranges.geometry.line_of_sight[self.first : self.last + 1], multipath)
+    def disturbed(self, multipath: Floats, burn_in: int, clock: Floats | None = None) -> Floats:
+        """What disturbances add to the code at epochs 0..K, (k, K+1, m), so that a fix would err by ``multipath``."""
+        geometry, game = self.ranges.geometry, slice(self.first, self.last + 1)
+        return disturbed_ranges(geometry.line_of_sight[game], multipath, geometry.present[game], clock)
 
     def satellites(self, index: Runs, burn_in: int) -> Runs:
         """Number of the satellite in each slot, (k, S); -1 = none."""

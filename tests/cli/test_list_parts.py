@@ -17,10 +17,14 @@ from spoofgym.navigation.aids import make_aids
 from spoofgym.policies import published
 from spoofgym.responses import make_response
 from spoofgym.scenarios import make_scenario
+from spoofgym.studies.evaluate import recorded
 from tests.run_folders import spoofer
 
 MAKE = {"scenarios": make_scenario, "detectors": make_detector, "attacks": make_spoofer, "responses": make_response}
 MAKE["aids"] = partial(make_aids, "test")
+
+ON_A_LOG = ("recorded", "position-only", "velocity-only")
+"""Attacks that need what only a log has: an attack of its own, or fixes with velocity."""
 
 
 @pytest.mark.parametrize("kind", REGISTRIES)
@@ -31,6 +35,10 @@ def test_every_part_tells_what_it_is_and_can_be_built_as_spelled(kind):
         if part.name != "recorded":
             MAKE[kind](part.example)
         words = shlex.split(part.command)
+        if kind == "attacks" and part.name in ON_A_LOG:
+            assert words[:4] == ["spoofgym", "evaluate", "recorded", "FOLDER"]
+            assert recorded.parser().parse_args(words[3:]).attack == [part.example]
+            continue
         assert words[:2] == ["spoofgym", "play"]
         play.seats(play.parser().parse_args(words[2:]))
 

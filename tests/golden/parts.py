@@ -7,6 +7,7 @@ import inspect
 from spoofgym.attacks import ATTACKS
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.detectors.base import Detector
+from spoofgym.detectors.receiver_flag import ReceiverFlag
 from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 
@@ -22,7 +23,7 @@ def ready(name: str, threshold: float = QUIET) -> Detector:
     for part in (*detector.members, detector):
         if part.lacks_slope:
             part.set_slope(0.1)
-        if part.threshold is None:
+        if part.threshold is None or isinstance(part, ReceiverFlag):
             part.set_threshold(threshold if part is detector else 1.0)
     return detector
 

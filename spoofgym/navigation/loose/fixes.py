@@ -67,8 +67,8 @@ class FixFamily(Immutable, ABC):
             return spoof.offset
         return np.concatenate([spoof.offset, spoof.rate], axis=1)
 
-    def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
-        """What multipath adds to the fixes at epochs 0..K, (k, K+1, m), m: nothing to a velocity."""
+    def disturbed(self, multipath: Floats, burn_in: int, clock: Floats | None = None) -> Floats:
+        """What disturbances add to the fixes at epochs 0..K, (k, K+1, m), m: nothing to velocities, and no clock."""
         added = np.zeros((*multipath.shape[:2], self.dimension))
         added[:, :, :3] = multipath
         return added

@@ -238,10 +238,10 @@ class TightFamily(RangeFamily):
             second = spoof.clock_rate[:, None] - along(direction, spoof.rate)
         return captured_ranges(dynamics.present[index], spoof, code, second)
 
-    def disturbed(self, multipath: Floats, burn_in: int) -> Floats:
-        """What multipath adds to the code at epochs 0..K, (k, K+1, m), so that a fix would err by ``multipath``."""
-        direction = self.tight_model(burn_in).dynamics.line_of_sight[burn_in:]
-        return disturbed_ranges(direction, multipath)
+    def disturbed(self, multipath: Floats, burn_in: int, clock: Floats | None = None) -> Floats:
+        """What disturbances add to the code at epochs 0..K, (k, K+1, m), so that a fix would err by ``multipath``."""
+        dynamics = self.tight_model(burn_in).dynamics
+        return disturbed_ranges(dynamics.line_of_sight[burn_in:], multipath, dynamics.present[burn_in:], clock)
 
     def satellites(self, index: Runs, burn_in: int) -> Runs:
         """Number of the satellite in each slot, (k, S); -1 = none."""

@@ -87,17 +87,21 @@ def captured_ranges(present: Flags, spoof: Spoof, code: Floats, second: Floats) 
     return added if spoof.ranges is None else added + spoof.ranges
 
 
-def disturbed_ranges(direction: Floats, multipath: Floats) -> Floats:
-    """What multipath adds to the code, (k, K+1, m), so that a fix would err by ``multipath``, (k, K+1, 3), m.
+def disturbed_ranges(direction: Floats, multipath: Floats, present: Flags, clock: Floats | None = None) -> Floats:
+    """What disturbances add to the code, (k, K+1, m), so that a fix would err by ``multipath``, (k, K+1, 3), m.
 
     Args:
         direction: unit vectors to the satellites at epochs 0..K, (K+1, S, 3), ENU.
-        multipath: its effect on fixes.
+        multipath: their effect on fixes.
+        present: slots that hold a satellite at these epochs, (K+1, S).
+        clock: by how much the receiver has set its clock, (k, K+1), m; None = it has not.
     """
     slots = direction.shape[1]
     added = np.zeros((*multipath.shape[:2], 2 * slots))
     for epoch in np.flatnonzero(multipath.any(axis=(0, 2))):
         added[:, epoch, :slots] = -along(direction[epoch][None], multipath[:, epoch])
+    if clock is not None and clock.any():
+        added[:, :, :slots] += clock[:, :, None] * present
     return added
 
 
