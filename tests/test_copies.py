@@ -31,13 +31,16 @@ COPY: dict[str, Callable[[Any], Any]] = {
 LOOSE = "liu-flight:horizon=24,onset=300"
 TIGHT = "kujur-flight:horizon=24,onset=120"
 ROBOT = "song-robot:horizon=24"
-GAMES = [(text, fidelity) for text in (LOOSE, TIGHT) for fidelity in ("linear", "strapdown")] + [(ROBOT, "linear")]
+AIDED, AIDED_TIGHT = f"{LOOSE},aids=barometer", f"{TIGHT},aids=barometer"
+BOTH = (LOOSE, TIGHT, AIDED, AIDED_TIGHT)
+"""Scenarios with both fidelities."""
+GAMES = [(text, fidelity) for text in BOTH for fidelity in ("linear", "strapdown")] + [(ROBOT, "linear")]
 BEFORE, AFTER = 9, 12
 
 
 def fitting(part: Detector | Response) -> list[str]:
     """The scenarios that offer what the part needs."""
-    return [text for text in (LOOSE, TIGHT, ROBOT) if set(part.needs) <= set(make_scenario(text).offers)]
+    return [text for text in (*BOTH, ROBOT) if set(part.needs) <= set(make_scenario(text).offers)]
 
 
 def together(text: str) -> list[Detector]:

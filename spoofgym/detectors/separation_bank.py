@@ -8,7 +8,7 @@ from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.detectors.base import ThresholdDetector
 from spoofgym.detectors.separation_theory import protection_level, separation_threshold
-from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES, FilterFacts
+from spoofgym.navigation.facts import COASTING, INERTIAL_SOLUTION, RANGES, FilterFacts
 from spoofgym.navigation.interface import Demands, Epoch
 from spoofgym.navigation.separation.coasting import coasting_tables
 from spoofgym.navigation.separation.windows import CoastingWindows, OwnFilters, Separated
@@ -60,7 +60,7 @@ class SeparationBank(ThresholdDetector):
     """
 
     kind = "separation-bank"
-    needs = (RANGES, INERTIAL_SOLUTION)
+    needs = (RANGES, INERTIAL_SOLUTION, COASTING)
     demands = Demands(auxiliary=True)
 
     def __init__(

@@ -9,6 +9,7 @@ from spoofgym.arrays import Floats
 from spoofgym.navigation.linear_model import LinearModel
 
 AIDS = "aids"
+COASTING = "coasting on inertia alone"
 INERTIAL_SOLUTION = "inertial solution"
 LINEAR_MODEL = "linear model"
 ODOMETER = "odometer"

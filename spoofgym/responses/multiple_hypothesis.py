@@ -9,7 +9,7 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Flags, Floats, Runs
 from spoofgym.navigation.error_model import NUM_INERTIAL
-from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
+from spoofgym.navigation.facts import COASTING, INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Decision, Demands, Epoch
 from spoofgym.responses.base import Response, given
 from spoofgym.responses.hypotheses import Bank, BankModel, PullKinds, bank_model, empty_bank, start
@@ -57,7 +57,7 @@ class MultipleHypothesis(Response):
     """
 
     kind = KIND
-    needs = (INERTIAL_SOLUTION, LINEAR_MODEL)
+    needs = (INERTIAL_SOLUTION, LINEAR_MODEL, COASTING)
 
     def __init__(
         self,
@@ -105,10 +105,9 @@ class MultipleHypothesis(Response):
         """Learn the filter's model, of which every hypothesis runs a copy.
 
         Raises:
-            ValueError: the filter has aids, which the hypotheses do not know, pulls would begin, turn or end in every
-                other epoch, or the fixes are not a position alone and pulls may be hidden.
+            ValueError: pulls would begin, turn or end in every other epoch, or the fixes are not a position alone and
+                pulls may be hidden.
         """
-        facts.refuse_aids(f"response {self.name!r}")
         model, interval = facts.model(0), facts.interval
         self._kinds = self._pulls(interval)
         self._model = bank_model(model, self._kinds, self.multipath)

@@ -15,8 +15,10 @@ from functools import lru_cache
 import numpy as np
 
 from spoofgym import validation
+from spoofgym.navigation.aids import IN_THE_AIR, Aid, make_aids, spell_aids
 from spoofgym.navigation.family import COUPLINGS, FilterFamily
 from spoofgym.navigation.loose.family import LooseFamily
+from spoofgym.navigation.tight.aided.family import with_aids
 from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import ALERT_LIMITS, Scenario
@@ -67,6 +69,7 @@ def kujur_flight(
     vertical_alert_limit: float = ALERT_LIMITS[1],
     drag_off_rate: float | None = None,
     guidance: str | None = None,
+    aids: str | None = None,
 ) -> Scenario:
     """The flight as a game on a filter that has settled for 15 minutes.
 
@@ -85,9 +88,11 @@ def kujur_flight(
         guidance: how the vehicle is steered by its own estimate: ``first-order:T``, or ``second-order:T/damping=D``,
             with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
             keeps its path whatever it estimates.
+        aids: what corrects the filter of ranges beside GNSS, at its epochs: ``barometer``, ``magnetometer``, or both
+            joined by ``+``, each with ``/`` in place of the commas between its options; None = nothing.
 
     Raises:
-        ValueError: an unknown coupling or IMU, or a number out of range.
+        ValueError: an unknown coupling, IMU or aid, a number out of range, or aids of a filter that takes fixes.
     """
     owner = "kujur-flight"
     validation.one_of(owner, "coupling", coupling, COUPLINGS)
@@ -100,6 +105,9 @@ def kujur_flight(
             f"a horizon of {horizon} epochs at {written(RATE)} Hz"
         )
     hour = validation.hour(owner, "hour", hour)
+    sensors = make_aids(owner, aids, IN_THE_AIR)
+    if sensors and coupling != "tight":
+        raise ValueError(f"{owner}: aids do not go together with fixes that are made from ranges: take coupling=tight")
     usual = DRAG_OFF_RATES[coupling]
     rules = flight_rules(owner, drag_off_rate, usual, horizontal_alert_limit, vertical_alert_limit)
     name = spell_changed(
@@ -113,6 +121,7 @@ def kujur_flight(
         horizontal_alert_limit=rules.alert_limits[0],
         vertical_alert_limit=rules.alert_limits[1],
         drag_off_rate=None if rules.fastest == usual else rules.fastest,
+        aids=spell_aids(sensors),
     )
     truth = SimulatedTruth(
         name=name,
@@ -121,12 +130,12 @@ def kujur_flight(
         onset=onset,
         horizon=horizon,
     )
-    return rules.scenario(FAMILIES[coupling](truth, hour, imu)).guided(guidance, "horizontal")
+    return rules.scenario(FAMILIES[coupling](truth, hour, imu, sensors)).guided(guidance, "horizontal")
 
 
-def _tight(truth: SimulatedTruth, hour: float, imu: str) -> TightFamily:
+def _tight(truth: SimulatedTruth, hour: float, imu: str, aids: tuple[Aid, ...]) -> TightFamily:
     """The filter that takes code and carrier of every satellite."""
-    return TightFamily(
+    family = TightFamily(
         truth=truth,
         grade=grade(imu),
         errors=KUJUR,
@@ -135,9 +144,10 @@ def _tight(truth: SimulatedTruth, hour: float, imu: str) -> TightFamily:
         mask=MASK,
         tuning=TUNING,
     )
+    return with_aids(family, aids)
 
 
-def _loose(truth: SimulatedTruth, hour: float, imu: str) -> LooseFamily:
+def _loose(truth: SimulatedTruth, hour: float, imu: str, aids: tuple[Aid, ...]) -> LooseFamily:
     """The filter that takes least-squares fixes from the code."""
     ranges = range_fix_along(KUJUR, gps_24(), truth.trajectory, RATE, 3600.0 * hour, MASK)
     east, north, up = np.sqrt(np.diag(ranges.covariance(truth.first(0)))).tolist()
@@ -151,5 +161,8 @@ def _loose(truth: SimulatedTruth, hour: float, imu: str) -> LooseFamily:
     )
 
 
-FAMILIES: dict[str, Callable[[SimulatedTruth, float, str], FilterFamily]] = {"loose": _loose, "tight": _tight}
+FAMILIES: dict[str, Callable[[SimulatedTruth, float, str, tuple[Aid, ...]], FilterFamily]] = {
+    "loose": _loose,
+    "tight": _tight,
+}
 """What makes the filter, by coupling."""

@@ -16,6 +16,7 @@ from spoofgym.navigation.aids import IN_THE_AIR, Aid, make_aids, spell_aids
 from spoofgym.navigation.family import COUPLINGS, FilterFamily
 from spoofgym.navigation.loose.aided.family import with_aids
 from spoofgym.navigation.loose.family import LooseFamily
+from spoofgym.navigation.tight.aided.family import with_aids as with_aids_on_ranges
 from spoofgym.navigation.tight.family import TightFamily
 from spoofgym.navigation.tuning import FilterTuning
 from spoofgym.scenario import ALERT_LIMITS, Scenario
@@ -116,7 +117,8 @@ def liu_flight(
             with ``axes=lateral`` or ``axes=horizontal`` and ``corridor=WIDTH`` after further slashes (s, m); None = it
             keeps its path whatever it estimates.
         aids: what corrects the filter beside GNSS: ``barometer``, ``magnetometer``, or both joined by ``+``, each with
-            ``/`` in place of the commas between its options; None = nothing.
+            ``/`` in place of the commas between its options; None = nothing. A filter of ranges reads them at its
+            epochs.
 
     Raises:
         ValueError: an unknown name, a number out of range, a game outside the flight, or options that do not go
@@ -160,8 +162,6 @@ def liu_flight(
     )
     if coupling == "tight" and (noise != "white" or coloured or sigma != 3.7):
         raise ValueError(f"{owner}: noise, sigma, markov_sigma, markov_time are of fixes; coupling=tight has none")
-    if coupling == "tight" and sensors:
-        raise ValueError(f"{owner}: aids go with coupling=loose; the filter that takes ranges has none yet")
     if noise == "ranges" and coloured:
         raise ValueError(f"{owner}: markov_sigma and markov_time go with noise=white; errors of ranges have their own")
     truth = SimulatedTruth(name=name, trajectory=_trajectory(), rate=rate, onset=onset, horizon=horizon)
@@ -206,7 +206,7 @@ def _loose(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> LooseFamily:
 
 def _tight(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> TightFamily:
     """The filter that takes code and rate of every range."""
-    return TightFamily(
+    family = TightFamily(
         truth=truth,
         grade=grade(imu),
         errors=LIU,
@@ -216,6 +216,7 @@ def _tight(truth: SimulatedTruth, imu: str, fixes: _Fixes) -> TightFamily:
         tuning=FilterTuning(),
         observable="rate",
     )
+    return with_aids_on_ranges(family, fixes.aids)
 
 
 FAMILIES: dict[str, Callable[[SimulatedTruth, str, _Fixes], FilterFamily]] = {"loose": _loose, "tight": _tight}

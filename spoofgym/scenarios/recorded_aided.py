@@ -11,7 +11,7 @@ from spoofgym.arrays import Floats, Runs
 from spoofgym.logs.aid_tables import TimedReadings
 from spoofgym.navigation.aids import Aid
 from spoofgym.navigation.aids.aid_set import AidSet, Readings
-from spoofgym.navigation.facts import AIDS, FilterFacts
+from spoofgym.navigation.facts import AIDS, INERTIAL_SOLUTION, FilterFacts
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.loose.aided.strapdown import AidedStrapdownNavigator
 from spoofgym.navigation.loose.strapdown_model import StrapdownModel
@@ -34,7 +34,7 @@ class RecordedAided(RecordedFixes):
     aids: tuple[Aid, ...]
     readings: tuple[TimedReadings, ...]
 
-    offers = (*RecordedFixes.offers, AIDS)
+    offers = (INERTIAL_SOLUTION, AIDS)
 
     def __post_init__(self) -> None:
         super().__post_init__()

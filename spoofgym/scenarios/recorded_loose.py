@@ -14,7 +14,7 @@ from spoofgym.logs.log import velocity_of
 from spoofgym.logs.log_noise import LogNoise
 from spoofgym.logs.spoofed_fixes import RecordedSpoof, recorded_spoof
 from spoofgym.logs.table import seconds
-from spoofgym.navigation.facts import INERTIAL_SOLUTION
+from spoofgym.navigation.facts import COASTING, INERTIAL_SOLUTION
 from spoofgym.navigation.interface import Demands
 from spoofgym.navigation.loose.fixes import FixFamily
 from spoofgym.navigation.loose.strapdown import StrapdownNavigator
@@ -40,7 +40,7 @@ class RecordedFixes(RecordedFamily, FixFamily):
             ``sigma_floor``; None = there are none.
     """
 
-    offers: ClassVar[tuple[str, ...]] = (INERTIAL_SOLUTION,)
+    offers: ClassVar[tuple[str, ...]] = (INERTIAL_SOLUTION, COASTING)
 
     sigma_floor: float = SIGMA_FLOOR
     noise: LogNoise | None = None

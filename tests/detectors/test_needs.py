@@ -9,7 +9,7 @@ from spoofgym.calibration import calibrated
 from spoofgym.detectors import DETECTORS, make_detector
 from spoofgym.detectors.base import Detector
 from spoofgym.geodesy import displace
-from spoofgym.navigation.facts import AIDS, INERTIAL_SOLUTION, LINEAR_MODEL, RANGES
+from spoofgym.navigation.facts import AIDS, COASTING, INERTIAL_SOLUTION, LINEAR_MODEL, RANGES
 from spoofgym.navigation.interface import Demands
 from spoofgym.scenarios import make_scenario
 from spoofgym.scenarios.recorded import recorded
@@ -121,7 +121,7 @@ def test_what_a_detector_asks_of_the_navigator_it_also_asks_of_the_scenario(name
         assert INERTIAL_SOLUTION in detector.needs
         # a bank on ranges reads the view where there is one, and else the tables of the model
         assert detector.needs_view or RANGES in detector.needs
-    assert set(detector.needs) <= {AIDS, INERTIAL_SOLUTION, LINEAR_MODEL, RANGES}
+    assert set(detector.needs) <= {AIDS, COASTING, INERTIAL_SOLUTION, LINEAR_MODEL, RANGES}
 
 
 def test_an_ensemble_needs_what_its_members_need():

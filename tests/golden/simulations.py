@@ -33,6 +33,7 @@ SCENARIOS = {
     "kujur": TIGHT,
     "song": ROBOT,
     "liu-aided": f"{LOOSE},aids=barometer+magnetometer:rate=2",
+    "kujur-aided": f"{TIGHT},aids=barometer+magnetometer:rate=0.5/gate=0.01",
     "foi-aided": "foi-drive:horizon=24,aids=wheel-speed:gate=0.01+zero-velocity",
 }
 GUIDED = ("first-order:2", "second-order:2/axes=horizontal")

@@ -11,7 +11,7 @@ import numpy as np
 from spoofgym import validation
 from spoofgym.arrays import Floats, Runs
 from spoofgym.burn_in_cache import kept_by_burn_in
-from spoofgym.navigation.facts import INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
+from spoofgym.navigation.facts import COASTING, INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.navigation.interface import Demands, Navigator
 from spoofgym.navigation.linear_model import ErrorDynamics, LinearModel, error_dynamics, linear_model
@@ -57,7 +57,7 @@ class LooseFamily(FixFamily):
     ranges: RangeFix | None = None
 
     fidelities = FIDELITIES
-    offers: ClassVar[tuple[str, ...]] = (INERTIAL_SOLUTION, LINEAR_MODEL)
+    offers: ClassVar[tuple[str, ...]] = (INERTIAL_SOLUTION, LINEAR_MODEL, COASTING)
     random = True
 
     def __post_init__(self) -> None:

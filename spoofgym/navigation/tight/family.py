@@ -14,7 +14,7 @@ from spoofgym.navigation.facts import FilterFacts
 from spoofgym.navigation.family import FIDELITIES
 from spoofgym.navigation.interface import Demands, Navigator
 from spoofgym.navigation.linear_model import LinearModel, error_dynamics, semidefinite_factor
-from spoofgym.navigation.loose.strapdown_model import strapdown_model
+from spoofgym.navigation.loose.strapdown_model import StrapdownModel, strapdown_model
 from spoofgym.navigation.spoof import Spoof
 from spoofgym.navigation.tight.model import (
     TightDynamics,
@@ -110,6 +110,10 @@ class TightFamily(RangeFamily):
 
     @cached_property
     def _dynamics(self) -> TightDynamics:
+        return self._make_dynamics()
+
+    def _make_dynamics(self) -> TightDynamics:
+        """What acts on the error at every epoch of `geometry`."""
         # the instability of the biases acts once per epoch, on states of its own
         steady = replace(self.grade, gyro_instability=0.0, accelerometer_instability=0.0)
         inertial = error_dynamics(
@@ -139,14 +143,17 @@ class TightFamily(RangeFamily):
             )
         return first
 
+    def _cold(self) -> Floats:
+        """The filter's P at power-on, (n, n)."""
+        inertial = self.tuning.initial_scale * self.tuning.initial_sigma(self.grade)
+        return cold_covariance(inertial, self.clock_sigma, self.errors, self.slots)
+
     @kept_by_burn_in
     def tight_model(self, burn_in: int = 0) -> TightModel:
         """The game in the linear fidelity, from epoch -burn_in on, every range used."""
         first = self._first(burn_in)
-        inertial = self.tuning.initial_scale * self.tuning.initial_sigma(self.grade)
-        cold = cold_covariance(inertial, self.clock_sigma, self.errors, self.slots)
         dynamics = self._dynamics
-        prior = settle(dynamics.part(0, first), cold)
+        prior = settle(dynamics.part(0, first), self._cold())
         return tight_model(dynamics.part(first, first + self.truth.horizon + burn_in + 1), prior)
 
     def linear_model(self, burn_in: int = 0) -> LinearModel:
@@ -167,6 +174,11 @@ class TightFamily(RangeFamily):
         if fidelity == "linear":
             kind = TightOwnNavigator if demands.excludes else TightNavigator
             return kind(model, num_runs, slices, demands)
+        inertial, satellites = self._strapdown(burn_in)
+        return TightStrapdownNavigator(inertial, model, satellites, num_runs, slices, demands)
+
+    def _strapdown(self, burn_in: int) -> tuple[StrapdownModel, Floats]:
+        """The inertial part of the game from epoch -burn_in on, and where the satellites are, (K+1, S, 3), m."""
         timeline = self.truth.timeline_from(burn_in)
         inertial = strapdown_model(
             self.truth.trajectory,
@@ -174,12 +186,11 @@ class TightFamily(RangeFamily):
             Receiver(rate=self.truth.rate),
             self.tuning,
             self.tuning.position_random_walk,
-            model.prior_covariance,
+            self.tight_model(burn_in).prior_covariance,
             timeline,
         )
         first = self._first(burn_in)
-        satellites = self.geometry.position[first : first + timeline.num_epochs + 1]
-        return TightStrapdownNavigator(inertial, model, satellites, num_runs, slices, demands)
+        return inertial, self.geometry.position[first : first + timeline.num_epochs + 1]
 
     @kept_by_burn_in
     def _initial_factors(self, burn_in: int) -> tuple[Floats, Floats]:

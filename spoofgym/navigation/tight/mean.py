@@ -153,3 +153,19 @@ def _advance(
             tight_filter.observe(columns, values[k + 1], prior[run], added, residual)
             kalman.whiten(factor[k + 1], residual, ranges[0])
             _in_position(response[k + 1 : k + 2], ranges, coming[run : run + 1])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def tell_coming(runs: Runs, index: Runs, offset: Floats, model: MeanModel, means: Means) -> None:
+    """Mean innovations of the coming epoch if the offset is held, of a slice of the runs, from their prior."""
+    _, _, _, _, present, columns, values, factor, _, response = model
+    prior, _, _, coming = means
+    m, still = columns.shape[0], np.zeros(4)
+    added, residual, ranges = np.empty(m), np.empty(m), np.empty((1, m))
+    for run in runs:
+        k = index[run] + 1
+        if k < values.shape[0]:
+            _spoofed(columns, values[k], present[k], offset[run], still, added)
+            tight_filter.observe(columns, values[k], prior[run], added, residual)
+            kalman.whiten(factor[k], residual, ranges[0])
+            _in_position(response[k : k + 1], ranges, coming[run : run + 1])

@@ -8,7 +8,7 @@ import numpy as np
 
 from spoofgym.arrays import Flags, Floats
 from spoofgym.immutable import Immutable
-from spoofgym.navigation.facts import INERTIAL_SOLUTION, RANGES
+from spoofgym.navigation.facts import COASTING, INERTIAL_SOLUTION, RANGES
 from spoofgym.navigation.interface import Innovation
 from spoofgym.navigation.mean import MeanFilter
 from spoofgym.navigation.spoof import Spoof
@@ -23,7 +23,7 @@ class RangeFamily(Immutable, ABC):
     """A family whose filter takes the ranges themselves, m = 2 S."""
 
     coupling = "tight"
-    offers: tuple[str, ...] = (INERTIAL_SOLUTION, RANGES)
+    offers: tuple[str, ...] = (INERTIAL_SOLUTION, RANGES, COASTING)
     measurement = "ranges"
     measures_velocity = False
 

@@ -126,8 +126,6 @@ def test_what_does_not_fit_is_refused_in_one_line(text, message):
 def test_an_aeroplane_has_no_wheels_on_the_road():
     with pytest.raises(ValueError, match=r"unknown aid 'wheel-speed'.*valid names: barometer, magnetometer"):
         make_aids("liu-flight", "wheel-speed", IN_THE_AIR)
-    with pytest.raises(ValueError, match="liu-flight: aids go with coupling=loose"):
-        make_scenario("liu-flight:coupling=tight,aids=barometer")
     with pytest.raises(ValueError, match="aids do not go together with fixes that are made from ranges"):
         make_scenario("liu-flight:noise=ranges,aids=barometer")
 

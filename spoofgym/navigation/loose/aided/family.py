@@ -13,7 +13,7 @@ from spoofgym.burn_in_cache import kept_by_burn_in
 from spoofgym.navigation.aids.aid import Aid
 from spoofgym.navigation.aids.aid_set import AidSet, Readings
 from spoofgym.navigation.error_model import NUM_INERTIAL
-from spoofgym.navigation.facts import AIDS, FilterFacts
+from spoofgym.navigation.facts import AIDS, INERTIAL_SOLUTION, LINEAR_MODEL, FilterFacts
 from spoofgym.navigation.interface import Demands, Navigator
 from spoofgym.navigation.loose.aided.dynamics import AidedDynamics, aided_dynamics, readings_along, steps_per_epoch
 from spoofgym.navigation.loose.aided.model import AidedModel, aided_model
@@ -40,7 +40,7 @@ class AidedFamily(LooseFamily):
 
     aids: tuple[Aid, ...]
 
-    offers = (*LooseFamily.offers, AIDS)
+    offers = (INERTIAL_SOLUTION, LINEAR_MODEL, AIDS)
 
     def __post_init__(self) -> None:
         super().__post_init__()

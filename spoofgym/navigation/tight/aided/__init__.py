@@ -1,0 +1,1 @@
+"""The tightly coupled filter with aids: they correct it at the epochs of the ranges, whatever becomes of these."""
