@@ -211,10 +211,15 @@ def starts(scenario: Scenario, detectors: Sequence[Detector], games: int) -> lis
     """Games that begin at equal distances along the log.
 
     Raises:
-        ValueError: the log is too short for one.
+        ValueError: the log is too short for one, or is spoofed itself.
     """
     games = validation.whole(OWNER, "episodes", games, 1)
     log = recorded_family(scenario)
+    if log.attacked and log.spoofed_within:
+        raise ValueError(
+            f"scenario {scenario.name!r} is one game, that of the attack in its ranges: 'spoofgym evaluate recorded' "
+            "plays it; without attack=recorded games end before the attack"
+        )
     time = log.epoch_time
     for detector in detectors:
         detector.bind(1, scenario.dimension)

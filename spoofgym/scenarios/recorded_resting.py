@@ -51,7 +51,8 @@ class RestingRanges(RecordedRanges):
     def alignment(self) -> Alignment:
         """Level and with its heading, as it is simulated, at the first fix from the log's start on."""
         heading = self.log.heading or HEADING
-        fix = int(np.searchsorted(self.log.fixes.time, self.log.start))
+        time = self.log.fixes.time
+        fix = min(int(np.searchsorted(time, self.log.start)), len(time) - 1)
         sigma = np.array([LEVEL_SIGMA, LEVEL_SIGMA, heading.sigma])
         attitude = attitude_matrix(0.0, 0.0, heading.value)
         return Alignment("static", fix, attitude, np.zeros(3), sigma, f"IMU {SIMULATED}: {self.imu.name}")

@@ -14,7 +14,7 @@ from spoofgym.cli.main import main
 from spoofgym.detectors import make_detector
 from spoofgym.envs.opponents import make_spoofer
 from spoofgym.evaluation.recorded import evaluate_recorded
-from spoofgym.evaluation.recorded_matrix import play
+from spoofgym.evaluation.recorded_matrix import play, starts
 from spoofgym.geodesy import position_difference
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
@@ -206,6 +206,11 @@ def test_rows_tell_false_alarms_detection_and_the_pull(clean: Path, pulled: Path
     assert not blind["detected"]
     with pytest.raises(ValueError, match="its ranges hold the recorded attack already"):
         evaluate_recorded(scenario, [make_attack("ramp:1")], [make_detector("px4-gate")])
+
+
+def test_a_matrix_is_not_made_of_spoofed_games(pulled: Path) -> None:
+    with pytest.raises(ValueError, match="is one game, that of the attack in its ranges"):
+        starts(resting(pulled, ",attack=recorded"), [], 3)
 
 
 def test_programs_say_that_the_imu_is_simulated(pulled: Path, capsys: pytest.CaptureFixture[str]) -> None:
