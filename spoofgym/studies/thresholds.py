@@ -24,6 +24,7 @@ from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.program import last_of, moved, program, say
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
+from spoofgym.scenarios.clean_scene import clean_scene
 from spoofgym.studies.giving import give
 
 EXAMPLES = (
@@ -78,7 +79,7 @@ def log_rows(
     rows: list[dict[str, Any]] = []
     for share in shares:
         with progress(f"thresholds at a share of {share:g}"):
-            ready, refused = those_with_thresholds([log], [make_detector(text) for text in detectors], share)
+            ready, refused = those_with_thresholds([clean_scene(log)], [make_detector(text) for text in detectors], share)
         for reason in refused.values():
             say(f"left out: {reason}")
         for detector in ready:
