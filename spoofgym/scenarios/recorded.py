@@ -227,7 +227,7 @@ class _Options:
             told = "takes the place of noise_factor and sigma_floor, and needs coupling=loose"
             raise ValueError(f"recorded: noise {told}")
         if self.coupling == "tight" and self.aids:
-            raise ValueError("recorded: aids go with coupling=loose; the filter that takes ranges has none yet")
+            raise ValueError("recorded: aids go with coupling=loose")
         if self.coupling != "tight" and self.oscillator != OSCILLATOR:
             raise ValueError("recorded: oscillator is that of a receiver of ranges: coupling=tight is needed")
         if self.simulated is not None and (self.alignment is not None or self.least_speed is not None):
