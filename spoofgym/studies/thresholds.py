@@ -77,9 +77,10 @@ def log_rows(
     """
     made = {detector.name: text for text, detector in ((text, make_detector(text)) for text in detectors)}
     rows: list[dict[str, Any]] = []
+    clean = clean_scene(log)
     for share in shares:
         with progress(f"thresholds at a share of {share:g}"):
-            ready, refused = those_with_thresholds([clean_scene(log)], [make_detector(text) for text in detectors], share)
+            ready, refused = those_with_thresholds([clean], [make_detector(text) for text in detectors], share)
         for reason in refused.values():
             say(f"left out: {reason}")
         for detector in ready:
