@@ -32,11 +32,14 @@ SCENARIOS = {
     "shadmehri-tuned": "shadmehri-flight:self-tuning,onset=27",
     "kujur": TIGHT,
     "song": ROBOT,
-    "liu-aided": f"{LOOSE},aids=barometer+magnetometer:rate=2",
-    "kujur-aided": f"{TIGHT},aids=barometer+magnetometer:rate=0.5/gate=0.01",
-    "foi-aided": "foi-drive:horizon=24,aids=wheel-speed:gate=0.01+zero-velocity",
 }
 GUIDED = ("first-order:2", "second-order:2/axes=horizontal")
+AIDED = {
+    "liu": f"{LOOSE},aids=barometer+magnetometer:rate=2",
+    "foi": "foi-drive:horizon=24,aids=wheel-speed:gate=0.01+zero-velocity",
+    "kujur": f"{TIGHT},aids=barometer+magnetometer:rate=0.5/gate=0.01",
+}
+"""Filters with aids; of their games little is kept."""
 HISTORY = 6
 
 
@@ -121,6 +124,24 @@ def guided(guidance: str) -> Arrays:
     return {name: played[name] for name in ("error", "deviation", "largest")}
 
 
+def aided(text: str, fidelity: str) -> Arrays:
+    """A filter with aids whose fixes are left out and taken back: what the aids say, and what comes of it."""
+
+    def decide(k: int) -> Decision:
+        return Decision(np.array([True, k % 3 != 0, k < 4]), np.array([3 if k == 6 else 0, 0, 0]))
+
+    def see(simulation: Simulation) -> Arrays:
+        told = simulation.epoch.view.aid_innovations
+        return {"aids": told.whitened, "auxiliary": np.array(simulation.navigator.auxiliary_offset)}
+
+    demands = Demands(excludes=True, history=HISTORY, auxiliary=True)
+    detectors = [ready("snapshot"), ready("aid-innovation:n=4")]
+    simulation = make(make_scenario(text), "ramp:0.5", detectors, fidelity=fidelity, demands=demands)
+    kept = ("aids", "auxiliary", "error", "nis", "position_variance", "statistic aid-innovation:n=4")
+    seen = trace(simulation, decide, see, epochs=8)
+    return {name: seen[name] for name in kept}
+
+
 def responded(text: str, name: str, fidelity: str) -> Arrays:
     """A response to detectors that soon alarm."""
     threshold = 300.0 if text == TIGHT else 60.0
@@ -154,6 +175,9 @@ def episodes() -> dict[str, Callable[[], Arrays]]:
         for fidelity in make_scenario(text).fidelities:
             all_of[f"used {key} {fidelity}"] = partial(plain, text, fidelity)
             all_of[f"decided {key} {fidelity}"] = partial(decided, text, fidelity)
+    for key, text in AIDED.items():
+        for fidelity in make_scenario(text).fidelities:
+            all_of[f"aided {key} {fidelity}"] = partial(aided, text, fidelity)
     for name in RESPONSES:
         for text in (LOOSE, TIGHT):
             scenario = make_scenario(text)
