@@ -16,8 +16,8 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 NOT_NUMERICAL = (
-    *("benchmarks", "calibration", "cli", "docs", "installed", "kernels", "learning", "policies", "report", "studies"),
-    *("train", "logs/importers"),
+    *("benchmarks", "calibration", "cli", "docs", "evaluation", "installed", "kernels", "learning", "logs"),
+    *("policies", "report", "scenarios", "studies", "train"),
     *("test_animation.py", "test_archive.py", "test_arguments.py", "test_cache_folder.py", "test_command_line.py"),
     *("test_conftest.py", "test_console.py", "test_copies.py", "test_files.py", "test_house.py"),
     *("test_other_kernels.py", "test_package.py", "test_program.py", "test_readme.py", "test_specification.py"),
@@ -29,14 +29,11 @@ NOT_NUMERICAL = (
     *("envs/test_frames.py", "envs/test_policies_within.py", "envs/test_policy_opponents.py", "envs/test_recording.py"),
     *("envs/test_rendering.py", "envs/test_sb3.py", "envs/test_spoofer_figure.py", "envs/test_tight_pages.py"),
     *("envs/test_trained.py", "envs/test_window.py"),
-    *("evaluation/test_benchmark_play.py", "evaluation/test_engine.py", "evaluation/test_game_trace.py"),
-    *("evaluation/test_recorded.py", "evaluation/test_recorded_matrix.py", "evaluation/test_recorded_ranges.py"),
-    *("logs/test_clock_steps.py", "logs/test_mutants.py", "logs/test_notes.py", "logs/test_range_fixes.py"),
-    *("logs/test_reference.py", "logs/test_table.py", "scenarios/test_cache.py", "scenarios/test_recorded_scenario.py"),
+    *("navigation/test_fidelities.py", "navigation/test_guided_motion.py", "responses/test_hypotheses.py"),
 )
-"""Files that are left out: programs, pages, importers, learners, who plays, files, words, copies, refused actions, what
-is found in a log, what is kept on disk, and what rounding does not move: shares and means of simulated games, and a
-posterior that a grid approximates. All else is numerical, what is added included."""
+"""Files that are left out: programs, pages, learners, who plays, files, words, copies, refused actions, what is kept on
+disk; scenarios and logs, whose parts are tested here; and what rounding does not move: shares and means of simulated
+games, and a posterior that a grid approximates. All else is numerical, what is added included."""
 NOT_NUMERICAL_EITHER = (
     "detectors/test_acceleration.py::test_the_spread_in_clean_games_is_that_of_the_receiver",
     "detectors/test_on_ranges.py::test_every_family_has_the_false_alarms_that_were_asked_for",
@@ -54,8 +51,6 @@ NOT_NUMERICAL_EITHER = (
     "responses/test_exclude_satellites.py::test_few_satellites_are_left_out_by_mistake",
     "responses/test_exclude_satellites.py::test_the_captured_satellite_is_found",
     "responses/test_multiple_hypothesis.py::test_an_attack_that_no_test_sees_costs_it_less_and_clean_games_hardly_more",
-    "scenarios/test_recorded.py::test_a_phone_of_unknown_mounting",
-    "scenarios/test_recorded_tight.py::test_a_phone_in_a_city",
 )
 """Tests of other files that are left out for the same reasons: those that take long."""
 OLDEST = {"x86_64": "Nehalem", "amd64": "Nehalem", "aarch64": "ARMV8", "arm64": "ARMV8"}

@@ -19,7 +19,7 @@ WITHOUT_TORCH = (
     "list",
     "list detectors",
     "play --scenario foi-drive:horizon=60 --page game.html --csv game.csv",
-    *(f"play --policy {agent}" for agent in AGENTS),
+    *(f"play --policy {agent}" for agent in ("liu-flight-snapshot-spoofer", "liu-flight-ramp-defender")),
     "evaluate spoofers --attacker liu-flight-snapshot-spoofer --episodes 200 --json a.json",
     "evaluate defenders --only --defender snapshot/exclude --episodes 20 --json d.json",
     "benchmark attack ramp:0.5 --tasks liu-flight/error/tuned-onset --workers 1 --json b.json",
@@ -83,13 +83,16 @@ def test_everything_but_training_works_without_its_extras(installation: Installa
         "from spoofgym.calibration import thresholds\n"
         "thresholds.SIMULATED_FIRST_ALARMS = 10\n"
         f"{in_one_process(WITHOUT_TORCH)}"
+        "from spoofgym.policies.learned import load_policy\n"
+        "from spoofgym.policies.published import published_folder, published_names\n"
+        "print([load_policy(published_folder(name)).folder.name for name in published_names()], file=sys.stderr)\n"
         f"print([name for name in {HEAVY} if name in sys.modules], file=sys.stderr)"
     )
     done = installation.run(installation.python, "-c", code)
     told = done.stderr.splitlines()
     expected = [f"{command} -> 0" for command in WITHOUT_TORCH]
     assert [line for line in told if " -> " in line] == expected, done.stderr
-    assert told[-1] == "[]"
+    assert told[-2:] == [str(list(AGENTS)), "[]"]
     assert {path.name for path in empty.iterdir()} == {"game.html", "game.csv", "a.json", "d.json", "b.json", "runs"}
     assert (empty / "game.html").read_text(encoding="utf-8").startswith("<!")
     assert json.loads((empty / "a.json").read_text())

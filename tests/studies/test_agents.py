@@ -66,10 +66,7 @@ def test_the_page_of_the_published_agents_is_the_table_of_their_cards() -> None:
             assert f"{score.metric} {agents.shown(score)} |" in text
 
 
-ONE_OF_EACH_ROLE = list({read_card(agents_folder() / name).role: name for name in published_names()}.values())
-
-
-@pytest.mark.parametrize("name", ONE_OF_EACH_ROLE)
+@pytest.mark.parametrize("name", ["liu-flight-snapshot-spoofer", "liu-flight-ramp-defender"])
 def test_a_published_agent_plays_as_its_card_tells(name: str) -> None:
     """500 games on the seeds of the card: intervals of 95 % of the same games overlap wherever it plays alike."""
     card = read_card(agents_folder() / name)
