@@ -24,6 +24,8 @@ from spoofgym.scenarios.recorded_resting import SIMULATED
 EXAMPLES = ("spoofgym check-log runs/flight", "spoofgym check-log runs/flight --json runs/faults.json")
 GRADE = "tactical"
 """Of the IMU that is simulated where an antenna rests and the log has none."""
+CAUTIOUS = 0.3
+"""NIS per degree of freedom below which a chi-square test at its nominal threshold hardly sees anything."""
 FILTER = "clean run"
 """What the findings of the filter are about."""
 
@@ -84,6 +86,8 @@ def lines(report: dict[str, Any]) -> list[str]:
     clean = report["clean"]
     if clean is not None:
         nis = f"mean NIS {clean['mean_nis']:.3g}, {clean['nis_per_degree']:.3g} per degree of freedom"
+        if clean["nis_per_degree"] < CAUTIOUS:
+            nis += f", where 1 is right: chi-square tests are nearly deaf; see spoofgym estimate-noise {report['log']}"
         result += [clean["alignment"], f"{FILTER}: {clean['epochs']} epochs, {nis}"]
     errors, warned = (sum(row["severity"] == kind for row in report["findings"]) for kind in ("error", "warning"))
     told = f"{_count(errors, 'error')}, {_count(warned, 'warning')}" if errors or warned else "nothing contradicts it"

@@ -85,7 +85,7 @@ def clean_stretch(log: RecordedFixes, begin: float | None = None, end: float | N
         raise ValueError(
             f"scenario {log.name!r}: a stretch needs {FEWEST} fixes, there are {max(last - first, 0)} between "
             f"{seconds(log.align_time + SETTLING if begin is None else begin)} s and "
-            f"{seconds(float(time[-1]) if end is None else end)} s"
+            f"{seconds(float(time[-1]) if end is None else end)} s; choose its begin and end"
         )
     return slice(first, last)
 

@@ -23,7 +23,7 @@ STEP = 1e-4
 """Of a parameter, in a difference."""
 TOLERANCE = 1e-3
 """Of the log-likelihood: the search ends where no step promises more."""
-STEPS = 60
+STEPS = 100
 BOXES = (1.0, 2.0)
 """Half the width of the box at first, and at most."""
 SMALLEST = 1e-6
