@@ -34,8 +34,8 @@ POLICIES = "policies"
 KINDS = (*REGISTRIES, POLICIES)
 WIDEST = 88
 """Columns of running text."""
-LEAST_TOLD = 16
-"""Columns of what is told beside a name, however narrow the terminal."""
+LEAST_TOLD = 40
+"""Columns of what is told beside a name; where fewer are left, it stands below the name."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -120,11 +120,20 @@ def _about(card: Card) -> str:
 
 
 def table(rows: Sequence[tuple[str, str]], terminal: bool) -> Iterator[str]:
-    """A line for each, cut after a word where a terminal is narrower; whole where the output is no terminal."""
+    """A line for each, cut after a word where a terminal is narrower; whole where the output is no terminal.
+
+    A terminal that leaves too little beside the names shows what is told below them, whole.
+    """
     width = max(len(name) for name, _ in rows) if rows else 0
-    left = max(get_terminal_size().columns - width - 2, LEAST_TOLD)
+    left = get_terminal_size().columns - width - 2
     for name, told in rows:
-        yield f"{name:<{width}}  {textwrap.shorten(told, left, placeholder=' ...') if terminal else told}"
+        if not terminal:
+            yield f"{name:<{width}}  {told}"
+        elif left >= LEAST_TOLD:
+            yield f"{name:<{width}}  {textwrap.shorten(told, left, placeholder=' ...')}"
+        else:
+            yield name
+            yield from _folded(told, 4)
 
 
 def _part(found: Part) -> Iterator[str]:

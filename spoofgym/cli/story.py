@@ -32,6 +32,9 @@ MOST_EVENTS = 14
 LABEL = 22
 """Columns of what stands before a sparkline."""
 LEAST_SPARKS = 10
+EVENT = 31
+"""Columns of what stands before an event, which is told below them in a narrow terminal."""
+LEAST_TOLD = 30
 SEAT = 10
 """Columns of what stands before a player."""
 
@@ -46,7 +49,7 @@ def story(game: GameTrace, columns: int, blocks: bool = True) -> Iterator[str]:
     """
     yield from _folded(_who(game), columns, SEAT)
     yield ""
-    yield from _events(game)
+    yield from _events(game, columns)
     yield ""
     yield from _sparklines(game, columns, BARS if blocks else PLAIN_BARS)
     yield ""
@@ -74,16 +77,22 @@ def _who(game: GameTrace) -> Iterator[str]:
     yield f"defender  {players.response or 'nobody: every fix is used'}"
 
 
-def _events(game: GameTrace) -> Iterator[str]:
+def _events(game: GameTrace, columns: int) -> Iterator[str]:
     happened = game.events
     if not happened:
         yield "Nothing happens: no attack, no alarm."
         return
-    yield f"{'time, s':>9}  {'error, m':>8}  {'pull, m':>8}  what happens"
+    header = f"{'time, s':>9}  {'error, m':>8}  {'pull, m':>8}"
+    yield header if columns - EVENT < LEAST_TOLD else f"{header}  what happens"
     pull = np.linalg.norm(game.spoofed - game.true, axis=1)
     for event in happened[:MOST_EVENTS]:
         k = event.epoch
-        yield f"{game.time[k]:>9.6g}  {game.error[k]:>8.2f}  {pull[k]:>8.2f}  {_told(event, game)}"
+        told, before = _told(event, game), f"{game.time[k]:>9.6g}  {game.error[k]:>8.2f}  {pull[k]:>8.2f}  "
+        if columns - EVENT < LEAST_TOLD:
+            yield before.rstrip()
+            yield from textwrap.wrap(told, columns, initial_indent=" " * 4, subsequent_indent=" " * 4)
+        else:
+            yield from textwrap.wrap(told, columns, initial_indent=before, subsequent_indent=" " * EVENT)
     if len(happened) > MOST_EVENTS:
         yield f"{'...':>9}  and {len(happened) - MOST_EVENTS} more; --csv and --page have all of them"
 
@@ -125,7 +134,8 @@ def _sparklines(game: GameTrace, columns: int, bars: str) -> Iterator[str]:
         yield f"{_short(label)} {sparkline(finite, width, bars)}"
         yield f"{'':<{LABEL}} 0 to {most:.3g}"
     yield f"{'GNSS':<{LABEL}} {decisions(game, width)}"
-    yield f"{'':<{LABEL}} {USED} used  {LEFT_OUT} left out  {TAKEN_BACK} taken back"
+    legend = f"{USED} used  {LEFT_OUT} left out  {TAKEN_BACK} taken back"
+    yield f"{'':<{LABEL}} {legend}" if LABEL + 1 + len(legend) <= columns else legend.rjust(columns)
 
 
 def _short(label: str) -> str:

@@ -63,10 +63,20 @@ def test_text_fits_the_terminal(arguments, columns, monkeypatch, capsys):
 
 
 def test_a_line_that_a_terminal_cuts_ends_after_a_word(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "40")
-    rows = [("ramp", "An offset that grows without a jump"), ("a-much-longer", "Short")]
-    assert list(table(rows, terminal=True)) == ["ramp           An offset that grows ...", "a-much-longer  Short"]
-    assert next(table(rows, terminal=False)).endswith("without a jump")
+    monkeypatch.setenv("COLUMNS", "60")
+    rows = [("ramp", "An offset that grows without a jump, for ever and ever"), ("a-much-longer", "Short")]
+    assert list(table(rows, terminal=True)) == [
+        "ramp           An offset that grows without a jump, for ...",
+        "a-much-longer  Short",
+    ]
+    assert next(table(rows, terminal=False)).endswith("and ever")
+
+
+def test_a_narrow_terminal_shows_it_whole_below_the_name(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "30")
+    rows = [("ramp", "An offset that grows without a jump"), ("jump", "Short")]
+    below = ["    An offset that grows", "    without a jump"]
+    assert list(table(rows, terminal=True)) == ["ramp", *below, "jump", "    Short"]
 
 
 def test_a_specification_tells_of_its_part(capsys):
