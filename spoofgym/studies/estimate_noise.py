@@ -31,7 +31,7 @@ EXAMPLES = (
     "spoofgym estimate-noise FOLDER -o FOLDER/noise.toml",
     "spoofgym estimate-noise FOLDER,velocity=false --end 150 --json -",
 )
-BOUNDS = {"least": "at its lower bound", "most": "at its upper bound", "undetermined": "the stretch does not tell"}
+BOUNDS = {"least": "lower bound", "most": "upper bound", "undetermined": "not told"}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -83,7 +83,8 @@ def noise_table(report: dict[str, Any]) -> Table:
     """A ``"noise-estimate"`` report for the terminal."""
     end = "" if report["converged"] else "; the search did NOT end by itself"
     title = f"{report['log']}: {report['epochs']} fixes, {report['begin_s']:.10g} to {report['end_s']:.10g} s"
-    caption = f"log-likelihood {report['log_likelihood_gain']:.0f} higher than before{end}"
+    notes = "lower and upper bound: it ran into one; not told: the stretch does not tell it"
+    caption = f"log-likelihood {report['log_likelihood_gain']:.0f} higher than before{end}; {notes}"
     table = Table(title=title, caption=caption, box=None)
     for heading in ("noise", "before", "now", "95 % interval", "unit", ""):
         table.add_column(heading, justify="right" if heading in ("before", "now", "95 % interval") else "left")

@@ -1,6 +1,6 @@
 """Noise-matched attacks: what they provoke in the filter, and whom they refuse."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -78,7 +78,7 @@ class WithoutModel(LooseFamily):
 @pytest.mark.parametrize("name", ["noise-matched", "tracking-error:noise-matched"])
 def test_a_scenario_without_a_linear_model_is_refused(name):
     flight = make_scenario(SHORT)
-    given = {field: getattr(flight.family, field) for field in LooseFamily.__dataclass_fields__}
+    given = {field.name: getattr(flight.family, field.name) for field in fields(LooseFamily)}
     with pytest.raises(ValueError, match=f"attack '{name}' needs linear model, which scenario 'liu-flight:horizon=20'"):
         Simulation(replace(flight, family=WithoutModel(**given)), make_attack(name))
 

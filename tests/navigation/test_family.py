@@ -1,6 +1,6 @@
 """A filter is a folder: one with a sixteenth state, made here, plays in a simulation like any other."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ class BarometerFamily(LooseFamily):
     @kept_by_burn_in
     def warm_start(self, burn_in=0):
         """That of the filter on fixes: the barometer is switched on just before the game."""
-        plain = {item: getattr(self, item) for item in LooseFamily.__dataclass_fields__}
+        plain = {item.name: getattr(self, item.name) for item in fields(LooseFamily)}
         return LooseFamily(**plain).warm_start(burn_in)
 
     @kept_by_burn_in
@@ -100,7 +100,7 @@ class BarometerFamily(LooseFamily):
 @pytest.fixture(scope="module")
 def scenario():
     base = make_scenario(BASE)
-    plain = {item: getattr(base.family, item) for item in LooseFamily.__dataclass_fields__}
+    plain = {item.name: getattr(base.family, item.name) for item in fields(LooseFamily)}
     return Scenario(family=BarometerFamily(**plain), drag_off_rate=base.drag_off_rate, error_scale=base.error_scale)
 
 

@@ -27,9 +27,9 @@ UNITS = {
     "gyro_walk": "rad/s/√s",
     "accelerometer_walk": "m/s²/√s",
     "position_walk": "m/√s",
-    "position_scale": "of the stated sigma",
+    "position_scale": "× stated",
     "position_floor": "m",
-    "velocity_scale": "of the stated sigma",
+    "velocity_scale": "× stated",
     "velocity_floor": "m/s",
 }
 
