@@ -105,9 +105,13 @@ class AidedCleanRun(CleanRun):
 
     Attributes:
         state: what the filter estimates of the states of the aids, (E + 1, a).
+        number: readings of each aid since the epoch before, (E + 1, A).
+        rejected: those that its gate left out, (E + 1, A).
     """
 
     state: Floats
+    number: Floats
+    rejected: Floats
 
 
 def clean_run(model: StrapdownModel) -> CleanRun:
@@ -128,7 +132,13 @@ def aided_clean_run(navigator: AidedStrapdownNavigator) -> AidedCleanRun:
     """
     model, state = navigator.model, navigator.aid_error
     deviation = np.zeros((len(model.time), model.dimension))
-    return AidedCleanRun(*_states(navigator, np.zeros(NUM_JOINT + state.shape[1]), deviation, lambda: state))
+    run = np.array([0])
+    more: tuple[Callable[[], Floats], ...] = (
+        lambda: state,
+        lambda: navigator.aid_innovations(run).count.astype(np.float64),
+        lambda: navigator.aid_innovations(run).rejected.astype(np.float64),
+    )
+    return AidedCleanRun(*_states(navigator, np.zeros(NUM_JOINT + state.shape[1]), deviation, *more))
 
 
 def tight_clean_run(navigator: TightStrapdownNavigator, deviation: Floats) -> TightCleanRun:

@@ -9,6 +9,7 @@ import numpy as np
 
 from spoofgym.arrays import Floats, Runs
 from spoofgym.logs.aid_tables import TimedReadings
+from spoofgym.logs.log_warning import warn
 from spoofgym.navigation.aids import Aid
 from spoofgym.navigation.aids.aid_set import AidSet, Readings
 from spoofgym.navigation.facts import AIDS, INERTIAL_SOLUTION, FilterFacts
@@ -20,6 +21,11 @@ from spoofgym.scenarios.clean_run import AidedCleanRun, aided_clean_run
 from spoofgym.scenarios.log_aids import USUAL_GATE
 from spoofgym.scenarios.recorded_loose import RecordedFixes
 from spoofgym.streams import RunStreams
+
+FEWEST = 10
+"""Readings of which it can be said that most are left out."""
+MOST_REJECTED = 0.5
+"""Share of readings left out above which an aid is of no use."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +99,25 @@ class RecordedAided(RecordedFixes):
         with self._refusing_divergence():
             run = aided_clean_run(self._navigator(self.model, 1, RunSlices(1), Demands()))
         self._warn_of_large_innovations(run)
+        self._warn_of_gates(run)
         return run
+
+    def _warn_of_gates(self, run: AidedCleanRun) -> None:
+        """Warn of aids that hardly get through their gates.
+
+        Warns:
+            LogWarning: the aid, how many of its readings are left out, and likely reasons.
+        """
+        for place, aid in enumerate(self.aids):
+            number, rejected = (int(each[:, place].sum()) for each in (run.number, run.rejected))
+            if number >= FEWEST and rejected > MOST_REJECTED * number:
+                warn(
+                    self.log.folder,
+                    f"the gate of {aid.kind} leaves out {rejected} of {number} readings: the sensor or the filter is "
+                    "wrong; likely reasons: a start or a bias that the IMU grade does not cover, so that the filter is "
+                    "sure of what is wrong (gate=0 lets the aid correct it), a wrong mounting, sigmas that are too "
+                    "small",
+                )
 
     def navigator(
         self, fidelity: str, demands: Demands, burn_in: int, num_runs: int, slices: RunSlices

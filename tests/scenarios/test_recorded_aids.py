@@ -188,19 +188,25 @@ def test_a_quiet_glide_that_passes_for_a_standstill_is_left_to_the_gate(folder: 
     """The synthetic drive shakes less than a car that stands, at 12 m/s: each zero velocity is far beyond the gate."""
     family = make_scenario(f"recorded:{folder},aids=zero-velocity").family
     assert len(family.readings[0].time) > 50
+    with pytest.warns(LogWarning, match="the gate of zero-velocity leaves out .* readings"):
+        assert family.clean.rejected.sum() > 50
     clean, plain = family.clean, make_scenario(f"recorded:{folder}").family.clean
     np.testing.assert_array_equal(clean.state, np.zeros((len(plain.nis) + 1, 0)))
     np.testing.assert_allclose(clean.nis, plain.nis, rtol=0.05, atol=0.05)
 
 
 @pytest.mark.parametrize(
-    ("name", "aids"), [("uav-octa", "barometer+magnetometer:declination=3/sigma=5"), ("car-comma", "wheel-speed")]
+    ("name", "aids"),
+    [("uav-octa", "barometer+magnetometer:declination=3/sigma=5"), ("car-comma", "wheel-speed:gate=0/mounting=5")],
 )
 def test_real_logs(name: str, aids: str) -> None:
+    """The gyro of car-comma is off by 3.8 deg/s, and there is no turn: fixes alone leave its heading far off."""
     if not (DATA / name).is_dir():
         pytest.skip(f"{DATA / name} is absent")
     clean = make_scenario(f"recorded:{DATA / name},aids={aids}").family.clean
     assert clean.nis_per_degree(30) < 1.0
-    assert np.all(np.isfinite(clean.state))
+    assert not clean.rejected.any()
     if name == "car-comma":
-        assert abs(clean.state[-1, 0]) < 0.03  # the wheels' radius is known to a few per cent
+        east, north = clean.attitude[-1, :2, 1]
+        assert abs(math.degrees(math.atan2(east, north)) - 2.0) < 5.0
+        assert math.degrees(clean.bias[-1, 2]) == pytest.approx(-3.8, abs=0.5)
