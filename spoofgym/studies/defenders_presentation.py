@@ -45,8 +45,8 @@ COLUMNS = (
 LEGEND = (
     "mean: real-time horizontal error over all decisions of all games, with 95 % interval. RMSE, max: from the onset "
     "on. found, after, error: the first fix excluded during the attack, and the error then. re-use, never: from the "
-    "attack's end until GNSS is used without interruption. clean out: share of clean fixes excluded. false alarms: "
-    "per epoch."
+    "attack's end until GNSS is used without interruption. clean out: share of clean fixes excluded, those after an "
+    "attack included. false alarms: exclusions that begin before an attack or without one, per epoch."
 )
 
 
