@@ -29,6 +29,19 @@ def published_names() -> list[str]:
     return sorted(path.parent.name for path in agents_folder().glob(f"*/{POLICY_FILE}"))
 
 
+def shown_player(specification: str) -> str:
+    """A player's specification as tables and figures show it: a policy in a folder of its own by the end of its path.
+
+    ``policy:/runs/exploit/spoofers/0b29/seed-3``, one of several seeds, becomes ``learned, seed 3``.
+    """
+    if not specification.startswith(POLICY):
+        return specification
+    parts = Path(specification.removeprefix(POLICY)).as_posix().split("/")
+    if parts[-1].startswith("seed-"):
+        return f"learned, {parts[-1].replace('-', ' ')}"
+    return "/".join(parts[-2:])
+
+
 def published_folder(name: str) -> Path:
     """The folder of a published agent.
 

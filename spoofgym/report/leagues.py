@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from spoofgym.policies.published import shown_player
 from spoofgym.report.figures import Bar, Bars, Figure, Layer, Line, Lines, Matrix, Section
 from spoofgym.report.tables import Report, counted, facts_of, interval_of, table_of
 
@@ -27,12 +28,6 @@ def league_sections(report: Report) -> list[Section]:
 
 def _payoff(specification: object) -> str:
     return "share of epochs" if str(specification).startswith("beyond") else "harm, m"
-
-
-def short(name: str) -> str:
-    """A player's name; of a policy in a folder of the league its place there."""
-    parts = str(name).removeprefix("policy:").split("/")
-    return name if not str(name).startswith("policy:") else "/".join(parts[-2:])
 
 
 def _values(rounds: Sequence[Report], payoff: str) -> Lines:
@@ -67,8 +62,8 @@ def _matrix(rounds: Sequence[Report], payoff: str) -> Matrix:
         summary=f"Mean payoff ({payoff}) of every spoofer (rows) against every defender (columns), with the share of "
         "each in the mixture of its side. The round can be chosen.",
         corner="spoofer",
-        rows=[short(name) for name in spoofers],
-        columns=[short(name) for name in defenders],
+        rows=[shown_player(name) for name in spoofers],
+        columns=[shown_player(name) for name in defenders],
         layers=[_layer(found, spoofers, defenders) for found in rounds],
         row_weights=[_weights(found, "spoofer", spoofers) for found in rounds],
         column_weights=[_weights(found, "defender", defenders) for found in rounds],
@@ -98,12 +93,12 @@ def _mixtures(rounds: Sequence[Report], side: str) -> Matrix:
     names = _names(rounds, side)
     weights = [_weights(found, side, names) for found in rounds]
     last = sorted(zip(names, weights[-1], strict=True), key=lambda pair: -(pair[1] or 0.0))
-    mixed = ", ".join(f"{short(name)} {share:.2f}" for name, share in last if share and share >= 0.005)
+    mixed = ", ".join(f"{shown_player(name)} {share:.2f}" for name, share in last if share and share >= 0.005)
     return Matrix(
         title=f"Mixture of the {side}s by round",
         summary=f"In the last round: {mixed}.",
         corner=side,
-        rows=[short(name) for name in names],
+        rows=[shown_player(name) for name in names],
         columns=[f"round {found['number']}" for found in rounds],
         layers=[Layer("share in the mixture", [list(row) for row in zip(*weights, strict=True)], most=1.0)],
     )
@@ -140,8 +135,8 @@ def _worst(last: Report, payoff: str) -> Bars:
         column = [row[place] for row in last["mean"]]
         worst = max(range(len(column)), key=column.__getitem__)
         half = last["half_width"][worst][place]
-        by = f"by {short(last['spoofers'][worst])}"
-        bars.append(Bar(short(name), column[worst], column[worst] - half, column[worst] + half, note=by))
+        by = f"by {shown_player(last['spoofers'][worst])}"
+        bars.append(Bar(shown_player(name), column[worst], column[worst] - half, column[worst] + half, note=by))
     bars.sort(key=lambda bar: bar.value or 0.0)
     return Bars(
         title="Worst case of every defender",
@@ -162,7 +157,7 @@ def exploit_sections(report: Report) -> list[Section]:
         bars=[_exploited(row) for row in rows],
     )
     cells = [(row["defender"], cell) for row in rows for cell in (*row["fixed"], *row["learned"])]
-    flat = [{"defender": defender, **cell} for defender, cell in cells]
+    flat = [{"defender": defender, **cell, "spoofer": shown_player(cell["spoofer"])} for defender, cell in cells]
     summary = "A row for each spoofer that was played against a defender."
     title = f"Exploitability on {report['scenario']}"
     return [Section(title, facts_of(report), [worst, table_of("All spoofers", summary, flat)])]
@@ -171,4 +166,4 @@ def exploit_sections(report: Report) -> list[Section]:
 def _exploited(row: Report) -> Bar:
     worst = row["worst"]
     low, high = interval_of(worst)
-    return Bar(row["defender"], worst["harm"], low, high, note=f"by {short(worst['spoofer'])}")
+    return Bar(row["defender"], worst["harm"], low, high, note=f"by {shown_player(worst['spoofer'])}")

@@ -6,7 +6,13 @@ from spoofgym.calibration import thresholds
 from spoofgym.envs.vector import DuelDefenderVectorEnv, DuelSpooferVectorEnv
 from spoofgym.policies import published
 from spoofgym.policies.learned import POLICY_FILE, SPOOFER, load_policy
-from spoofgym.policies.published import agents_folder, policy_folder, published_folder, published_names
+from spoofgym.policies.published import (
+    agents_folder,
+    policy_folder,
+    published_folder,
+    published_names,
+    shown_player,
+)
 from spoofgym.policies.recipe import read_recipe
 
 
@@ -76,3 +82,16 @@ def test_they_are_small_and_can_be_trained_again() -> None:
     assert size < 3e6
     for name in published_names():
         assert read_recipe(published_folder(name)).options["seed"] is not None
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ("ramp:0.5", "ramp:0.5"),
+        ("policy:drive-ramp-defender", "drive-ramp-defender"),
+        ("policy:/runs/league/policies/spoofer-1", "policies/spoofer-1"),
+        ("policy:/runs/exploit/spoofers/0b2914cd4e0b/seed-3", "learned, seed 3"),
+    ],
+)
+def test_a_player_is_shown_without_its_path(given, shown):
+    assert shown_player(given) == shown
