@@ -22,7 +22,6 @@ from spoofgym.scenarios.clean_run import coasted_positions
 from spoofgym.scenarios.clean_scene import clean_scene
 from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
 from spoofgym.simulation import Simulation
-from spoofgym.validation import written
 
 RECOVERED = 1.0
 """So near to the filter of the clean log a victim has recovered from an attack, horizontally, m."""
@@ -119,8 +118,9 @@ def clean_figures(scenario: Scenario, detectors: Sequence[Detector]) -> CleanFig
     first = max(int(np.searchsorted(time, begin)), memory)
     if first > len(time) - 2:
         raise ValueError(
-            f"scenario {scenario.name!r}: the log ends at {written(time[-1])} s; clean figures need fixes after "
-            f"{written(begin)} s and {memory} epochs"
+            f"scenario {scenario.name!r}: {time[-1] - log.align_time:.3g} s of the log, {len(time)} fixes, follow the "
+            f"alignment; clean figures need more than {SETTLING:g} s, in which the filter settles"
+            + (f", and more than {memory} fixes, which the detectors remember" if memory else "")
         )
     whole = scenario.changed(onset=float(time[first]), horizon=None)
     simulation = Simulation(whole, None, detectors, seed=0, fidelity="strapdown")
