@@ -5,6 +5,7 @@ spoofgym study delay --attack ramp:1,direction=0 --delay 0 --delay 10
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from rich.table import Table
 from spoofgym.command_line import STDOUT, Parser, add_import, add_json, add_seed, add_threads, count
 from spoofgym.console import console
 from spoofgym.evaluation.delay import delay_reports
-from spoofgym.program import last_of, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies.giving import give
 
@@ -82,3 +83,7 @@ def delay_table(report: dict[str, Any]) -> Table:
 def _cells(deviation: dict[str, Any]) -> tuple[str, str]:
     low, high = deviation["largest_ci95_m"]
     return f"{deviation['largest_m']:.2f} ±{0.5 * (high - low):.2f}", f"{deviation['left_corridor']:.3f}"
+
+
+if __name__ == "__main__":
+    sys.exit(moved("spoofgym study delay"))

@@ -5,6 +5,7 @@ spoofgym study fusion-ripper FOLDER --json out.json
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from rich.table import Table
 from spoofgym.command_line import STDOUT, Parser, add_json
 from spoofgym.console import console
 from spoofgym.evaluation.fusion_ripper import LIMITS, fusion_ripper_report
-from spoofgym.program import program
+from spoofgym.program import moved, program
 from spoofgym.studies.giving import give
 from spoofgym.studies.presentation import number
 
@@ -76,3 +77,7 @@ def fusion_ripper_table(report: dict[str, Any]) -> Table:
             number(over["ours_s"], ".0f"),
         )
     return table
+
+
+if __name__ == "__main__":
+    sys.exit(moved("spoofgym study fusion-ripper"))

@@ -109,6 +109,10 @@ def test_acna_jump_test_against_the_waiting_time_for_a_run_of_two():
 class Stub(SimpleNamespace):
     __hash__ = object.__hash__
 
+    @property
+    def unguided(self):
+        return self
+
 
 def scenario_of(factor, *, matched=True, num_epochs=120):
     factors = np.broadcast_to(factor, (num_epochs + 1, *factor.shape))
