@@ -61,7 +61,8 @@ def _matrix(report: Report, names: Mapping[str, str]) -> Matrix:
 def _curves(report: Report, names: Mapping[str, str]) -> Curves:
     curves = [_curve(item, names) for item in report["curves"]]
     attacks = list(dict.fromkeys(curve.choice for curve in curves))
-    chosen = FIRST_ATTACK if FIRST_ATTACK in attacks else attacks[0]
+    told = [attack for attack in attacks if attack != "none"] or attacks  # clean games have the curve of chance
+    chosen = FIRST_ATTACK if FIRST_ATTACK in told else told[0]
     return Curves(
         title="ROC and DET curves",
         summary="Detection probability of a game over its false-alarm probability, as the threshold changes. The "

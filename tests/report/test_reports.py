@@ -76,6 +76,15 @@ def test_the_matrix_has_its_shares_intervals_and_curves():
     assert curves.curves[0].x == [point["false_alarm_probability"] for point in report["curves"][0]["points"]]
 
 
+def test_curves_of_an_attack_are_shown_before_those_of_clean_games():
+    report = reports.matrix()
+    for item in report["curves"]:
+        item["attack"] = {"ramp:0.1": "none"}.get(item["attack"], item["attack"])
+    chosen = figure(report, Curves).chosen
+    assert chosen != "none"
+    assert chosen in {item["attack"] for item in report["curves"]}
+
+
 def test_a_league_shows_rounds_mixtures_and_values():
     report = reports.league()
     values, matrix = figure(report, Lines), figure(report, Matrix)

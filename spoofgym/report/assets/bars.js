@@ -37,7 +37,7 @@
     const width = page.width(node);
     const narrow = width < 640;
     const labels = narrow ? 0 : Math.min(Math.max(...figure.bars.map((bar) => reach(bar.label))) + 10, 0.38 * width);
-    const noted = figure.bars.some((bar) => bar.note);
+    const noted = figure.bars.some((bar) => bar.note || (narrow && reach(`${bar.label}: ${written(bar)}`) > width));
     const row = narrow ? (noted ? 60 : 46) : 27;
     const head = 18 * figure.marks.length + 6;
     const bottom = head + row * figure.bars.length;

@@ -36,7 +36,7 @@
           if (value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9)) found.push(value);
         }
       }
-      return found;
+      return found.length > 2 ? found : page.ticks(low, high, count);
     };
     return scale;
   };
