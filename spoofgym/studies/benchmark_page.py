@@ -20,11 +20,13 @@ from spoofgym.policies.learned import LearnedSpoofer, load_policy
 from spoofgym.policies.published import POLICY, published_folder, published_names
 
 Rows = dict[str, list[dict[str, Any]]]
+LATER = {"attack": (), "defend": ("multiple-hypothesis",)}
+"""Players of the tables that came after the benchmark was pinned. They change no reference: the version stays."""
 
 
 def players_of(benchmark: Benchmark) -> dict[str, list[str]]:
-    """The players of the tables: the pinned baselines, and every published agent of the role, by the track."""
-    found = {track: list(benchmark.baselines(track)) for track in TRACKS}
+    """The players of the tables by the track: the pinned baselines, later ones, every published agent of the role."""
+    found = {track: [*benchmark.baselines(track), *LATER[track]] for track in TRACKS}
     for name in published_names():
         spoofs = isinstance(load_policy(published_folder(name)), LearnedSpoofer)
         found[TRACKS[0] if spoofs else TRACKS[1]].append(f"{POLICY}{name}")
