@@ -89,6 +89,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("study fidelity-of-thresholds", "thresholds in both fidelities", f"{STUDIES}.fidelity_of_thresholds"),
         Command("study noise", "filters before and after their noises are estimated", f"{STUDIES}.blind_noise"),
         Command("study aids", "what barometer and wheels do to spoofers", f"{STUDIES}.aids"),
+        Command("study real-attacks", "every detector on real attacks and logs", f"{STUDIES}.real_attacks"),
         Command("study recorded-ranges", "loose and tight filters on a log", f"{STUDIES}.recorded_ranges"),
         Command("study fusion-ripper", "FusionRipper on a drive, published and ours", f"{STUDIES}.fusion_ripper"),
         Command("study delay", "what a defender's delay costs on the road", f"{STUDIES}.delay"),

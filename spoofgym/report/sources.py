@@ -20,6 +20,7 @@ from spoofgym.report.figures import Section
 from spoofgym.report.games import game_section
 from spoofgym.report.integrities import integrity_sections
 from spoofgym.report.leagues import exploit_sections, league_sections
+from spoofgym.report.real_attacks import real_attacks_sections
 from spoofgym.report.tables import Report, plain_section
 from spoofgym.report.trainings import TrainingRun, is_run, training_sections
 from spoofgym.validation import shown
@@ -39,6 +40,7 @@ VIEWS: dict[str, Callable[[Report], list[Section]]] = {
     "duel-bound": duel_sections,
     "benchmark": benchmark_sections,
     "integrity": integrity_sections,
+    "real-attacks": real_attacks_sections,
     **dict.fromkeys(
         (
             *("tuning", "thresholds", "fidelity of thresholds", "acna-study", "wrong-shadow", "reproduction"),

@@ -158,7 +158,7 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
     detectors, attacks, detected = values(report, "detection_probability")
     _, _, error = values(report, "mean_undetected_error_m")
     labels = [plain(names[name]) for name in detectors]
-    left, below = _margins(labels, list(map(plain, attacks)))
+    left, below = margins(labels, list(map(plain, attacks)))
     width = max(left + CELL[0] * len(attacks) + MARGIN, LEAST_WIDTH)
     titles = [
         f"{plain(report['scenario'])}: games with an alarm, %, at {common_rate(report)} "
@@ -181,13 +181,13 @@ def matrix_figure(report: dict[str, Any], path: Path) -> None:
         figure.text(MARGIN / width, top / height, title, fontsize=11, va="top")
         bottom = top - room - cells
         place = (left / width, bottom / height, CELL[0] * len(attacks) / width, cells / height)
-        _heat(figure.add_axes(place), labels, attacks, colour, text, palette, most)
+        heat(figure.add_axes(place), labels, attacks, colour, text, palette, most)
         top = bottom - below
     figure.text(MARGIN / width, MARGIN / height, notes, fontsize=8, va="bottom")
     files.write_figure(path, figure)
 
 
-def _margins(rows: list[str], columns: list[str]) -> tuple[float, float]:
+def margins(rows: list[str], columns: list[str]) -> tuple[float, float]:
     """Left of the cells and below them, inches: the labels of the rows, and those of the columns at their angle."""
     lengths = [LETTER * len(name) for name in columns]
     slope = np.radians(ANGLE)
@@ -198,7 +198,7 @@ def _margins(rows: list[str], columns: list[str]) -> tuple[float, float]:
     )
 
 
-def _heat(
+def heat(
     axes: Axes, rows: list[str], columns: list[str], colour: Floats, text: Floats, palette: str, most: float | None
 ) -> None:
     """One heat map: coloured by ``colour``, each cell written with ``text``."""
