@@ -57,6 +57,8 @@ ESTIMATED = "estimated"
 """The option ``noise`` that names the file in the folder of the log."""
 DRAG_OFF_RATE = (4.0, 4.0, 4.0)
 """Largest rate of a spoofed position per axis, and of a spoofed clock, m/s."""
+RANGE_SCALES = (0.01, 100.0)
+"""Least and largest factor on the sigmas of ranges."""
 ALIGNMENT_VELOCITY_SIGMA = (0.5, 0.5, 0.5)
 NOISE_FACTOR = 20.0
 """The filter's white inertial noise over the data sheet's, for what its model leaves out (presumably scale factor,
@@ -83,6 +85,8 @@ def recorded(
     oscillator: str = OSCILLATOR,
     attack: str | None = None,
     clean: str | None = None,
+    code_scale: float = 1.0,
+    rate_scale: float = 1.0,
 ) -> Scenario:
     """A log in the project's format as a game.
 
@@ -118,6 +122,8 @@ def recorded(
         attack: ``recorded``: the game is the attack that the log holds.
         clean: folder of a log of the same scene without the attack, for thresholds and false alarms; None = what comes
             before the attack.
+        code_scale: on the sigma of a code that follows from its C/N0, from 0.01 to 100.
+        rate_scale: on that of a range rate.
 
     Raises:
         ValueError: a path with a comma, an unknown grade, a log that cannot be used or has no ranges, an onset or a
@@ -150,6 +156,8 @@ def recorded(
         oscillator=validation.one_of("recorded", "oscillator", oscillator, tuple(OSCILLATORS)),
         attack=attack,
         clean=None if clean is None else str(Path(clean)),
+        code_scale=validation.between("recorded", "code_scale", code_scale, *RANGE_SCALES),
+        rate_scale=validation.between("recorded", "rate_scale", rate_scale, *RANGE_SCALES),
     )
     options.check()
     family = options.family()
@@ -210,6 +218,8 @@ class _Options:
     oscillator: str
     attack: str | None
     clean: str | None
+    code_scale: float
+    rate_scale: float
 
     def check(self) -> None:
         """Refuse options that do not go together.
@@ -230,6 +240,8 @@ class _Options:
             raise ValueError("recorded: aids go with coupling=loose")
         if self.coupling != "tight" and self.oscillator != OSCILLATOR:
             raise ValueError("recorded: oscillator is that of a receiver of ranges: coupling=tight is needed")
+        if self.coupling != "tight" and (self.code_scale, self.rate_scale) != (1.0, 1.0):
+            raise ValueError("recorded: code_scale and rate_scale are of ranges: coupling=tight is needed")
         if self.simulated is not None and (self.alignment is not None or self.least_speed is not None):
             raise ValueError(f"recorded: alignment and least_speed are not for imu={SIMULATED}: its attitude is known")
 
@@ -244,6 +256,8 @@ class _Options:
             "fixes": FIXES[0],
             "oscillator": OSCILLATOR,
             "coupling": COUPLINGS[0] if simulated is None else "tight",
+            "code_scale": 1.0,
+            "rate_scale": 1.0,
         }
         given = {
             "grade": self.grade.name,
@@ -262,6 +276,8 @@ class _Options:
             "oscillator": self.oscillator,
             "attack": self.attack,
             "clean": self.clean,
+            "code_scale": self.code_scale,
+            "rate_scale": self.rate_scale,
         }
         return spell("recorded", self.path, **{key: value for key, value in given.items() if value != usual.get(key)})
 
@@ -286,6 +302,8 @@ class _Options:
         common |= {"attacked": self.attack is not None}
         if self.coupling == "tight" or self.fixes == "ranges":
             check_ranges_of(self.path)
+        if self.coupling == "tight":
+            common |= {"code_scale": self.code_scale, "rate_scale": self.rate_scale}
         if self.simulated is not None:
             return _resting(resting_log(self.path), imu=self.simulated, errors=self.errors, **common)
         return FAMILIES[self.coupling](checked_log(self.path), self, **common)

@@ -55,6 +55,8 @@ class RecordedRanges(RecordedFamily, RangeFamily):
     Attributes:
         epochs: the ranges.
         errors: what the filter believes of slow errors and of the clock; its noise of code and rate is not read.
+        code_scale: on the sigma of a code that follows from its C/N0.
+        rate_scale: on that of a range rate.
     """
 
     doubts = (
@@ -66,6 +68,8 @@ class RecordedRanges(RecordedFamily, RangeFamily):
 
     epochs: RangeEpochs
     errors: RangeErrors = ERRORS
+    code_scale: float = 1.0
+    rate_scale: float = 1.0
 
     @property
     def slots(self) -> int:
@@ -134,7 +138,7 @@ class RecordedRanges(RecordedFamily, RangeFamily):
             observation=np.zeros((epochs, 0, NUM_NAVIGATION)),
         )
         steady = tight_dynamics(inertial, self.grade, self.errors, ranges.geometry, ranges.interval, "rate")
-        sigma = np.concatenate([ranges.code_sigma, ranges.rate_sigma], axis=1)
+        sigma = np.concatenate([self.code_scale * ranges.code_sigma, self.rate_scale * ranges.rate_sigma], axis=1)
         return replace(
             steady,
             time=ranges.time,

@@ -39,6 +39,7 @@ LACKING = {
         **dict.fromkeys(("benchmark attack", "benchmark defend", "benchmark table", "benchmark references"), WORKERS),
         "bound bayes": WORKERS,
         **dict.fromkeys(("play", "evaluate recorded", "study recorded-ranges", "study fusion-ripper"), ONE_RUN),
+        "study real-attacks": ONE_RUN,
         **dict.fromkeys(("estimate-noise", "study noise"), ONE_RUN),
         **dict.fromkeys(("thresholds", "bound duel", "export", "agents", "reproduce", "study aids"), SERIAL),
     },

@@ -65,6 +65,10 @@ MUTANTS: dict[str, tuple[Change, str]] = {
         both(*(scaled(t, ("t_s",), 1e3) for t in ("imu", "gnss", "reference"))),
         "t_s is in millisec",
     ),
+    "a sample each 20 s": (
+        lambda f: f.tables.update(imu={name: values[::500] for name, values in f.tables["imu"].items()}),
+        "a sample comes each 20 s, too seldom",
+    ),
     "fixes 18 s late": (added("gnss", "t_s", 18.0), "UTC against GPS time differ by 18 s"),
     "fixes 18 s early": (added("gnss", "t_s", -18.0), "UTC against GPS time differ by 18 s"),
     "fixes 1 s late": (added("gnss", "t_s", 1.0), "fixes are 1.0 s later than the IMU"),

@@ -111,6 +111,24 @@ def test_a_log_without_an_imu_says_how_to_play_it(clean: Path, capsys: pytest.Ca
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 
+def test_sigmas_of_ranges_can_be_scaled(clean: Path) -> None:
+    """The noise is a fifth of what follows from C/N0: a filter that is told so has a NIS per degree near 1."""
+    usual, told = (resting(clean, options) for options in ("", ",code_scale=0.2,rate_scale=0.2"))
+    sigma = usual.family.dynamics.noise_variance[200] ** 0.5
+    there = sigma != 1.0  # an empty slot
+    np.testing.assert_allclose((told.family.dynamics.noise_variance[200] ** 0.5)[there], 0.2 * sigma[there])
+    assert usual.family.clean.nis_per_degree(150) < 0.1
+    assert 0.5 < told.family.clean.nis_per_degree(150) < 1.2
+    assert told.name.endswith("code_scale=0.2,rate_scale=0.2")
+    assert resting(clean, ",code_scale=1,rate_scale=1.0").name == usual.name
+
+
+def test_scales_of_ranges_are_not_for_fixes(tmp_path: Path) -> None:
+    write_log(tmp_path)
+    with pytest.raises(ValueError, match="code_scale and rate_scale are of ranges: coupling=tight is needed"):
+        make_scenario(f"recorded:{tmp_path},code_scale=0.5")
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -118,6 +136,8 @@ def test_a_log_without_an_imu_says_how_to_play_it(clean: Path, capsys: pytest.Ca
         ("imu=simulated:golden", r"imu: unknown IMU grade 'golden'; valid grades: .*tactical"),
         (f"{OPTIONS},coupling=loose", "needs coupling=tight"),
         (f"{OPTIONS},alignment=static", "alignment and least_speed are not for imu=simulated"),
+        (f"{OPTIONS},code_scale=0", "code_scale must be"),
+        (f"{OPTIONS},rate_scale=1000", "rate_scale must be"),
         (f"{OPTIONS},oscillator=sundial", "oscillator must be one of tcxo, ocxo, rubidium"),
         (f"{OPTIONS},clean=elsewhere", "attack is not given"),
         (f"{OPTIONS},attack=ramp", "attack must be one of recorded"),

@@ -99,12 +99,26 @@ class CleanRecord:
         return np.hstack([first > of_second, second > of_first])[0]
 
 
-def watch(scenario: Scenario, given: Sequence[Detector] | None) -> Watch:
+def room(scenario: Scenario, attack: bool) -> int:
+    """How many epochs a detector may remember: those before the log's real attack, or else half of all.
+
+    Args:
+        scenario: a recorded log.
+        attack: whether it holds a real attack that is to be played.
+    """
+    family = recorded_family(scenario)
+    if not attack:
+        return len(family.epoch_time) // 2
+    return int(np.searchsorted(family.epoch_time, family.recorded_spoof().begin - 1e-6)) - 1
+
+
+def watch(scenario: Scenario, given: Sequence[Detector] | None, longest: int) -> Watch:
     """The detectors that can watch a record, each by itself.
 
     Args:
         scenario: a recorded log.
         given: detectors; None = one of every family, with its usual options.
+        longest: memory that the record has room for, epochs.
 
     Raises:
         ValueError: the log ends before it has settled.
@@ -114,7 +128,7 @@ def watch(scenario: Scenario, given: Sequence[Detector] | None) -> Watch:
     if given is not None:
         asked = {detector.name: detector for detector in given}
     for name, part in asked.items():
-        _admit(watched, name, copy.deepcopy(make_detector(part)))
+        _admit(watched, name, copy.deepcopy(make_detector(part)), longest)
     if given is None:
         watched.left_out.update(dict.fromkeys(TOLD, "is told whether signals are counterfeit"))
     family = recorded_family(scenario)
@@ -129,7 +143,7 @@ def watch(scenario: Scenario, given: Sequence[Detector] | None) -> Watch:
     return replace(watched, scenario=whole)
 
 
-def _admit(watched: Watch, name: str, detector: Detector) -> None:
+def _admit(watched: Watch, name: str, detector: Detector, longest: int) -> None:
     """Let a detector watch, or say why it cannot."""
     scenario, grows = watched.scenario, detector.lacks_slope
     lacking = [need for need in detector.needs if need not in scenario.offers]
@@ -139,6 +153,9 @@ def _admit(watched: Watch, name: str, detector: Detector) -> None:
         fit_detectors(OWNER, [detector], scenario, 1)
     except ValueError as error:
         watched.left_out[name] = f"needs {' and '.join(lacking)}" if lacking else str(error)
+        return
+    if detector.memory > longest:
+        watched.left_out[name] = f"remembers {detector.memory} epochs, for which the log is too short"
         return
     watched.detectors.append(detector)
     watched.names.append(name)

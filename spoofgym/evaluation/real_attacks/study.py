@@ -17,7 +17,7 @@ from spoofgym.attacks.staggered import Stretch
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.matrix import exact_interval
 from spoofgym.evaluation.progress import Progress, silent
-from spoofgym.evaluation.real_attacks.clean_record import CleanRecord, Watch, clean_record, false_alarms, watch
+from spoofgym.evaluation.real_attacks.clean_record import CleanRecord, Watch, clean_record, false_alarms, room, watch
 from spoofgym.evaluation.real_attacks.injected import injected
 from spoofgym.evaluation.real_attacks.outcomes import Game, game, outcome, standing
 from spoofgym.evaluation.real_attacks.passes import Pass, play
@@ -31,6 +31,7 @@ from spoofgym.scenarios.recorded_resting import RestingRanges
 KIND = "real-attacks"
 GAMES = 8
 PROBABILITY = 0.01
+TOO_EARLY = "the real attack begins before the filter has settled"
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,8 @@ def _study(record: Record, asked: Asked, found: _Found) -> None:
     """Play one record."""
     scenario = record.attacked() if record.within else record.scenario()
     scene = clean_scene(scenario) if record.within else scenario
-    watched = watch(scene, asked.detectors)
+    longest = min(room(scene, record.beside), room(scenario, record.beside or record.within))
+    watched = watch(scene, asked.detectors, longest)
     clean = clean_record(watched, asked.probability, asked.seed)
     for part, reason in watched.left_out.items():
         found.left_out.append({"log": record.name, "part": part, "reason": reason})
@@ -157,9 +159,11 @@ def _beside(
     attacks, left_out = injected(scenario, asked.words, asked.games)
     found.left_out += [{"log": record.name, "part": word, "reason": reason} for word, reason in left_out.items()]
     stretches, groups = [Stretch(NoAttack(), 0, last)], []
-    if record.beside:
+    if record.beside and scenario.timeline.start < recorded_family(scenario).recorded_spoof().begin - 1e-6:
         groups.append((RECORDED, RECORDED, [len(stretches)]))
         stretches.append(Stretch(Recorded(), 0, last))
+    elif record.beside:
+        found.left_out.append({"log": record.name, "part": RECORDED, "reason": TOO_EARLY})
     for one in attacks:
         games = one.staggered()
         groups.append((one.word, one.attack.name, list(range(len(stretches), len(stretches) + len(games)))))
@@ -185,8 +189,8 @@ def _within(
     memory = max((detector.memory for detector in watched.detectors), default=0)
     first = max(int(np.searchsorted(family.epoch_time, family.align_time + SETTLING)), memory)
     whole = scenario.changed(onset=float(family.epoch_time[first]), horizon=None)
-    if not whole.timeline.start < spoof.begin:
-        raise ValueError(f"scenario {scenario.name!r}: its attack begins before the filter has settled")
+    if not whole.timeline.start < spoof.begin - 1e-6:
+        raise ValueError(f"scenario {scenario.name!r}: {TOO_EARLY}")
     played = play(whole, watched.detectors, [Stretch(Recorded(), 0, whole.timeline.num_epochs)], seed)
     before = int(np.searchsorted(played.time, spoof.begin)) - 1
     effects = family.log.effects

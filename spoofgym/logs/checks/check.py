@@ -66,7 +66,7 @@ def _stop(folder: Path, findings: list[Finding]) -> None:
 
 def table_findings(tables: Tables) -> Iterator[Finding]:
     """What the tables show before the log is made of them."""
-    yield from check_sample_times(tables.imu["t_s"])
+    yield from check_sample_times(tables.imu["t_s"], tables.gnss["t_s"])
     yield from check_fix_times(tables.gnss["t_s"])
     start = tables.notes.seconds("start_s", None)
     for name, table in (("gnss.csv", tables.gnss), ("reference.csv", tables.reference)):

@@ -8,11 +8,14 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.logs.checks.finding import Finding
+from spoofgym.logs.checks.times import SLOWEST_FIXES
 from spoofgym.logs.log import Log, velocity_of
 from spoofgym.logs.table import seconds
 
 SLOWEST_RATE = 0.5
 """Longest usual time between samples that can be one, s."""
+MUCH_LONGER = 30.0
+"""Times the fixes' time, which samples in seconds do not last; those in milliseconds last a thousand times as long."""
 HOLE = 0.5
 """Time without samples that no game may hold, s."""
 STILL = 0.3
@@ -27,13 +30,17 @@ MOVING = 2.0
 """Speed of a vehicle that moves, m/s."""
 
 
-def check_sample_times(time: Floats) -> Iterator[Finding]:
-    """Whether the times of samples, (n,), can be seconds."""
+def check_sample_times(time: Floats, fixes: Floats) -> Iterator[Finding]:
+    """Whether the times of samples, (n,), can be seconds.
+
+    Few samples that last as long as fixes, (k,), whose times are seconds, are in seconds, too, and come too seldom.
+    """
     step = float(np.median(np.diff(time)))
     if step <= SLOWEST_RATE:
         return
+    in_seconds = float(np.median(np.diff(fixes))) <= SLOWEST_FIXES and np.ptp(time) <= MUCH_LONGER * np.ptp(fixes)
     for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)):
-        if 5e-4 < step / factor < 0.11:
+        if 5e-4 < step / factor < 0.11 and not in_seconds:
             advice = f"divide t_s by {factor:g}"
             yield Finding("error", "imu.csv", f"t_s is in {unit}: a sample comes each {step:g} s", advice, 1)
             return
