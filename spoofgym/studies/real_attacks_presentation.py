@@ -13,6 +13,7 @@ from rich.text import Text
 
 from spoofgym.calibration.thresholds import poisson_interval
 from spoofgym.evaluation.matrix import exact_interval
+from spoofgym.scenarios.recorded_family import SETTLING
 from spoofgym.studies.presentation import number
 
 Rows = Sequence[Mapping[str, Any]]
@@ -252,6 +253,9 @@ def left_out_lines(report: Mapping[str, Any]) -> Iterator[str]:
         if not log["supported"]:
             least = rounded_up(log["least_probability"])
             yield f"{log['log']}: not supported: {log['clean_epochs']} clean epochs need --p-fa {least:g} or more"
+        if log["settling_s"] < SETTLING - 1.0:
+            told = f"the filter had {log['settling_s']:.1f} s to settle, half of the log; {SETTLING:g} s are usual"
+            yield f"{log['log']}: {told}"
         options = log["scenario"].partition(",")[2]
         if options:
             told = f"; IMU simulated: {log['simulated_imu']}" if log["simulated_imu"] else ""

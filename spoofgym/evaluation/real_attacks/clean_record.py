@@ -23,7 +23,7 @@ from spoofgym.evaluation.matrix import exact_interval
 from spoofgym.evaluation.real_attacks.passes import UNREACHED, play
 from spoofgym.fitting import fit_detectors
 from spoofgym.scenario import Scenario
-from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
+from spoofgym.scenarios.recorded_family import SETTLING, RecordedFamily, recorded_family
 
 OWNER = "real-attacks"
 TOLD = ("receiver-flag",)
@@ -36,7 +36,7 @@ class Watch:
     """The detectors of a record, and where its games begin.
 
     Attributes:
-        scenario: from `SETTLING` after the alignment on, or from where the longest memory is full.
+        scenario: from its `first_epoch` on.
         detectors: with thresholds that nothing reaches.
         names: of the detectors: those of their families, or their specifications where they were given.
         growing: which statistics grow in clean runs, so that a line through them is taken away.
@@ -48,6 +48,11 @@ class Watch:
     names: list[str]
     growing: list[bool]
     left_out: dict[str, str]
+
+    @property
+    def memory(self) -> int:
+        """The longest of all detectors, epochs."""
+        return max((detector.memory for detector in self.detectors), default=0)
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,18 @@ class CleanRecord:
         return np.hstack([first > of_second, second > of_first])[0]
 
 
+def first_epoch(family: RecordedFamily, memory: int) -> int:
+    """Epoch 0 of the games of a record: the filter has settled for `SETTLING`, or half the log, and memories are full.
+
+    Args:
+        family: of the record.
+        memory: the longest of its detectors, epochs.
+    """
+    time = family.epoch_time
+    settling = min(SETTLING, 0.5 * float(time[-1] - family.align_time))
+    return max(int(np.searchsorted(time, family.align_time + settling)), memory)
+
+
 def room(scenario: Scenario, attack: bool) -> int:
     """How many epochs a detector may remember: those before the log's real attack, or else half of all.
 
@@ -121,7 +138,7 @@ def watch(scenario: Scenario, given: Sequence[Detector] | None, longest: int) ->
         longest: memory that the record has room for, epochs.
 
     Raises:
-        ValueError: the log ends before it has settled.
+        ValueError: the log is too short.
     """
     watched = Watch(scenario, [], [], [], {})
     asked: dict[str, str | Detector] = {name: name for name in DETECTORS if name not in TOLD}
@@ -131,13 +148,12 @@ def watch(scenario: Scenario, given: Sequence[Detector] | None, longest: int) ->
         _admit(watched, name, copy.deepcopy(make_detector(part)), longest)
     if given is None:
         watched.left_out.update(dict.fromkeys(TOLD, "is told whether signals are counterfeit"))
-    family = recorded_family(scenario)
-    memory = max((detector.memory for detector in watched.detectors), default=0)
-    first = max(int(np.searchsorted(family.epoch_time, family.align_time + SETTLING)), memory)
-    if first > len(family.epoch_time) - 2:
+    family, memory = recorded_family(scenario), watched.memory
+    first = first_epoch(family, memory)
+    if first > len(family.epoch_time) - 3:
         raise ValueError(
-            f"scenario {scenario.name!r}: the log ends before it has settled: {len(family.epoch_time)} epochs follow "
-            f"the alignment, of which the first {SETTLING:g} s and the {memory} that detectors remember do not count"
+            f"scenario {scenario.name!r}: the log ends before the study can begin: {len(family.epoch_time)} epochs "
+            f"follow the alignment, of which {first} are needed for the filter to settle and detectors to remember"
         )
     whole = scenario.changed(onset=float(family.epoch_time[first]), horizon=None)
     return replace(watched, scenario=whole)

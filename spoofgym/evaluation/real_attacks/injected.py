@@ -31,8 +31,8 @@ LONGEST = 60.0
 """Of an attack, s."""
 LEAD = 0.125
 """Share of a record before the first onset, and after the last attack."""
-LEAST_OFFSET = 0.1
-"""An attack that never moves a fix by this, m, is none: a frozen fix of an antenna that rests."""
+LEAST_OFFSET = 0.5
+"""An attack that never moves a fix by this, m, is left out: a frozen fix of a vehicle that rests."""
 
 
 @dataclass(frozen=True)
@@ -98,14 +98,14 @@ def injected(scenario: Scenario, words: dict[str, str], games: int) -> tuple[lis
             if does_something(scenario, one):
                 found.append(one)
             else:
-                left_out[word] = "it changes nothing here: the vehicle rests"
+                left_out[word] = f"moves the fix by less than {LEAST_OFFSET:g} m here"
         except ValueError as error:
             left_out[word] = str(error)
     return found, left_out
 
 
 def does_something(scenario: Scenario, one: Injected) -> bool:
-    """Whether an attack ever moves a fix, its velocity or the clock.
+    """Whether an attack ever moves a fix by `LEAST_OFFSET`, or acts on velocity or clock alone.
 
     Raises:
         ValueError: the record does not give what it needs.

@@ -17,7 +17,15 @@ from spoofgym.attacks.staggered import Stretch
 from spoofgym.detectors.base import Detector
 from spoofgym.evaluation.matrix import exact_interval
 from spoofgym.evaluation.progress import Progress, silent
-from spoofgym.evaluation.real_attacks.clean_record import CleanRecord, Watch, clean_record, false_alarms, room, watch
+from spoofgym.evaluation.real_attacks.clean_record import (
+    CleanRecord,
+    Watch,
+    clean_record,
+    false_alarms,
+    first_epoch,
+    room,
+    watch,
+)
 from spoofgym.evaluation.real_attacks.injected import injected
 from spoofgym.evaluation.real_attacks.outcomes import Game, game, outcome, standing
 from spoofgym.evaluation.real_attacks.passes import Pass, play
@@ -25,7 +33,7 @@ from spoofgym.evaluation.real_attacks.records import Record
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios.clean_scene import clean_scene
-from spoofgym.scenarios.recorded_family import SETTLING, recorded_family
+from spoofgym.scenarios.recorded_family import recorded_family
 from spoofgym.scenarios.recorded_resting import RestingRanges
 
 KIND = "real-attacks"
@@ -132,7 +140,6 @@ def _study(record: Record, asked: Asked, found: _Found) -> None:
 def _log(record: Record, watched: Watch, clean: CleanRecord) -> dict[str, Any]:
     """What the clean record of a log supports."""
     family = recorded_family(watched.scenario)
-    settled = int(np.searchsorted(family.epoch_time, family.align_time + SETTLING))
     return {
         "log": record.name,
         "scenario": watched.scenario.name,
@@ -140,13 +147,14 @@ def _log(record: Record, watched: Watch, clean: CleanRecord) -> dict[str, Any]:
         "filter": "tight" if watched.scenario.slots else "loose",
         "simulated_imu": family.imu.name if isinstance(family, RestingRanges) else None,
         "interval_s": watched.scenario.timeline.interval,
+        "settling_s": watched.scenario.timeline.start - family.align_time,
         "clean_epochs": clean.epochs,
         "clean_s": float(clean.time[-1] - clean.start),
         "least_probability": 1.0 / clean.epochs,
         "supported": clean.alarms > 0,
         "alarms_set": clean.alarms,
         "set_ci95": exact_interval(clean.alarms, clean.epochs) if clean.alarms else None,
-        "nis_per_degree": family.clean.nis_per_degree(settled),
+        "nis_per_degree": family.clean.nis_per_degree(family.first),
     }
 
 
@@ -186,8 +194,7 @@ def _within(
     """Rows of the real attack that the log's own ranges hold."""
     family = recorded_family(scenario)
     spoof = family.recorded_spoof()
-    memory = max((detector.memory for detector in watched.detectors), default=0)
-    first = max(int(np.searchsorted(family.epoch_time, family.align_time + SETTLING)), memory)
+    first = first_epoch(family, watched.memory)
     whole = scenario.changed(onset=float(family.epoch_time[first]), horizon=None)
     if not whole.timeline.start < spoof.begin - 1e-6:
         raise ValueError(f"scenario {scenario.name!r}: {TOO_EARLY}")

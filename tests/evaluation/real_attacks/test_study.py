@@ -174,7 +174,7 @@ def test_ranges_that_are_spoofed_find_their_clean_scene(antenna: Path) -> None:
     assert found["recovery_s"] is None  # it lasts to the end
     assert row(report, "clock-drift", "time", "scene")["found"] == 2
     reasons = {entry["part"]: entry["reason"] for entry in report["left_out"]}
-    assert reasons["frozen"] == "it changes nothing here: the vehicle rests"
+    assert reasons["frozen"] == "moves the fix by less than 0.5 m here"
 
 
 def test_without_a_scene_the_record_before_the_attack_is_the_clean_one(antenna: Path) -> None:
