@@ -23,7 +23,7 @@ ONLY_PARSED = {
     **dict.fromkeys(("benchmark", "bound bayes", "bound duel", "integrity", "matrix", "thresholds"), MINUTES),
     **dict.fromkeys(("reproduce", "study acna", "study aids", "study self-tuning", "study patient-spoofer"), MINUTES),
     **dict.fromkeys(("study fidelity-of-thresholds", "study recorded-ranges", "study delay"), MINUTES),
-    **dict.fromkeys(("evaluate defenders",), MINUTES),
+    **dict.fromkeys(("evaluate defenders", "study real-attacks"), MINUTES),
     "study noise": MINUTES,
 }
 """Programs that no page runs in a few seconds."""
