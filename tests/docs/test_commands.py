@@ -29,7 +29,7 @@ ONLY_PARSED = {
 """Programs that no page runs in a few seconds."""
 MANY_GAMES = re.compile(r"^spoofgym evaluate spoofers (?!.*--episodes \d{1,3}\b|.*--episodes 1000\b)")
 """An evaluation of spoofers that does not ask for a thousand games or less; without a word it plays 20,000."""
-CALIBRATED_FOR = ("foi-drive:horizon=60,imu=tactical",)
+CALIBRATED_FOR = ("foi-drive:horizon=60,imu=tactical", "liu-flight:aids=barometer")
 """Scenarios of which a command needs thresholds that no other test does; to find them takes 20 s."""
 OF_THE_READER = ("runs/", "FOLDER", "my-flight", "my_drones", ".ulg", ".zip")
 """In commands that take a training, a log or a module of the reader's."""

@@ -57,16 +57,22 @@ def test_a_published_name_is_no_folder_of_the_working_directory(agents, tmp_path
 
 
 def test_the_agents_of_this_version_can_play(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against detectors that are calibrated in a hurry."""
+    """All are loaded; one of each role plays the drive, against detectors that are calibrated in a hurry."""
     monkeypatch.setattr(thresholds, "SIMULATED_FIRST_ALARMS", 10)
     monkeypatch.setattr(thresholds, "_KNOWN", {})
     names = published_names()
     assert names
     with pytest.raises(ValueError, match=rf"no published agent is named 'x'; published agents: {', '.join(names)}$"):
         published_folder("x")
+    players = {}
     for name in names:
         policy = load_policy(published_folder(name))
         assert policy.name == name
+        if policy.configuration["scenario"] == "foi-drive":
+            players[policy.kind] = name
+    assert len(players) == 2
+    for name in players.values():
+        policy = load_policy(published_folder(name))
         detectors = tuple(policy.configuration.get("detectors", ["snapshot"]))
         config = {"scenario": policy.configuration["scenario"], "detectors": detectors}
         if policy.kind == SPOOFER:

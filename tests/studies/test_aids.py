@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from spoofgym.calibration import thresholds
 from spoofgym.policies.scripted import OffsetSequence
 from spoofgym.scenarios import make_scenario
 from spoofgym.studies import aids
@@ -34,6 +35,7 @@ def test_wheels_hold_a_drive_without_gnss():
 
 
 def test_the_program_prints_both_tables(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(thresholds, "SIMULATED_FIRST_ALARMS", 10)  # nothing here depends on how often detectors alarm
     monkeypatch.setattr(aids, "FLIGHTS", ("liu-flight:horizon=10", "liu-flight:horizon=10,aids=barometer"))
     monkeypatch.setattr(aids, "IMUS", ("fog",))
     monkeypatch.setattr(aids, "WHEELS", ("wheel-speed",))
