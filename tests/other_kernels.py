@@ -36,7 +36,8 @@ NOT_NUMERICAL = (
 )
 """Files that are left out: programs, pages, learners, who plays, files, words, copies, refused actions, what is kept on
 disk; scenarios and logs, whose parts are tested here; and what rounding does not move: shares and means of simulated
-games, a posterior that a grid approximates, and filters with aids, whose golden episodes are played. All else is numerical, what is added included."""
+games, a posterior that a grid approximates, and filters with aids, whose golden episodes are played. All else is
+numerical, what is added included."""
 NOT_NUMERICAL_EITHER = (
     "detectors/test_relative_motion.py::test_what_the_filter_does_with_the_fixes_does_not_matter",
     "detectors/test_separation_windows.py::test_twenty_minutes_after_their_common_origin",
