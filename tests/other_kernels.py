@@ -22,22 +22,22 @@ NOT_NUMERICAL = (
     *("test_conftest.py", "test_console.py", "test_copies.py", "test_files.py", "test_house.py"),
     *("test_other_kernels.py", "test_package.py", "test_program.py", "test_readme.py", "test_specification.py"),
     *("test_stress.py", "test_tutorial.py", "test_validation.py"),
-    *("attacks/test_families.py", "navigation/test_consistency.py", "optimum/test_bayes_choosers.py"),
+    *("navigation/test_consistency.py", "optimum/test_bayes_choosers.py"),
     *("optimum/test_bayes_estimates.py", "optimum/test_bayes_posterior.py", "optimum/test_bayes_schedule.py"),
-    *("responses/test_backtrack_into_manoeuvre.py", "sensors/test_confounders.py"),
+    "sensors/test_confounders.py",
     *("envs/test_actions.py", "envs/test_copied_games.py", "envs/test_duel.py", "envs/test_duel_sides.py"),
     *("envs/test_frames.py", "envs/test_policies_within.py", "envs/test_policy_opponents.py", "envs/test_recording.py"),
     *("envs/test_rendering.py", "envs/test_sb3.py", "envs/test_spoofer_figure.py", "envs/test_tight_pages.py"),
     *("envs/test_trained.py", "envs/test_window.py"),
-    *("navigation/test_fidelities.py", "navigation/test_guided_motion.py", "responses/test_hypotheses.py"),
-    *("attacks/test_recorded.py", "attacks/test_code_only.py", "detectors/test_aid_innovation.py"),
-    *("detectors/test_needs.py", "envs/test_bank_features.py", "envs/test_defender_vector.py"),
+    *("navigation/test_fidelities.py", "navigation/test_guided_motion.py"),
+    *("attacks", "responses", "detectors/test_aid_innovation.py", "detectors/test_needs.py"),
+    *("envs/test_bank_features.py", "envs/test_defender_vector.py"),
     *("navigation/aids/test_aided_filter.py", "navigation/aids/test_aided_ranges.py"),
 )
 """Files that are left out: programs, pages, learners, who plays, files, words, copies, refused actions, what is kept on
-disk; scenarios and logs, whose parts are tested here; and what rounding does not move: shares and means of simulated
-games, a posterior that a grid approximates, and filters with aids, whose golden episodes are played. All else is
-numerical, what is added included."""
+disk; scenarios, logs, attacks and responses, whose parts or golden episodes are tested here; and what rounding does not
+move: shares and means of simulated games, a posterior that a grid approximates, and filters with aids, whose golden
+episodes are played. All else is numerical, what is added included."""
 NOT_NUMERICAL_EITHER = (
     "detectors/test_relative_motion.py::test_what_the_filter_does_with_the_fixes_does_not_matter",
     "detectors/test_separation_windows.py::test_twenty_minutes_after_their_common_origin",
@@ -54,9 +54,6 @@ NOT_NUMERICAL_EITHER = (
     "envs/test_tight_defender.py::test_code_residuals_are_standard_normal_in_a_clean_game",
     "envs/test_vector.py::test_checker_finds_faults",
     "navigation/credible/test_runs.py::test_a_standing_start_is_stationary",
-    "responses/test_exclude_satellites.py::test_few_satellites_are_left_out_by_mistake",
-    "responses/test_exclude_satellites.py::test_the_captured_satellite_is_found",
-    "responses/test_multiple_hypothesis.py::test_an_attack_that_no_test_sees_costs_it_less_and_clean_games_hardly_more",
 )
 """Tests of other files that are left out for the same reasons: those that take long."""
 OLDEST = {"x86_64": "Nehalem", "amd64": "Nehalem", "aarch64": "ARMV8", "arm64": "ARMV8"}

@@ -9,6 +9,7 @@ The first takes the logs in ``../shared/data``, the second a log of your own.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from spoofgym.evaluation.progress import Progress
 from spoofgym.evaluation.real_attacks.injected import INJECTED, words_of
 from spoofgym.evaluation.real_attacks.records import folders_of, records
 from spoofgym.evaluation.real_attacks.study import GAMES, PROBABILITY, Asked, real_attacks
-from spoofgym.program import last_of, program
+from spoofgym.program import last_of, moved, program
 from spoofgym.studies.giving import Output, give
 from spoofgym.studies.real_attacks_figure import real_attacks_figure
 from spoofgym.studies.real_attacks_presentation import real_attacks_tables
@@ -85,3 +86,7 @@ def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         options.seed,
     )
     return last_of(real_attacks(records(texts), asked, progress, lenient=not options.logs))
+
+
+if __name__ == "__main__":
+    sys.exit(moved("spoofgym study real-attacks"))
