@@ -1,7 +1,7 @@
 """The flight of Liu et al. (2018): 1100 s near Xi'an, 100 Hz.
 
-The paper gives the trajectory as a figure only. Speed, height, the times and angles of the turns and the end follow it;
-the shapes of the manoeuvres are ours.
+The paper prints no trajectory but its end state (appendix C), which the flight ends in. Speed, height, turns and the
+shapes of the manoeuvres are ours.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
-"""The azimuth attack of FOI-R-5687 just as its chapter 4 prints it.
+"""The azimuth attack of FOI-R-5687, by our reading of its chapter 4, which is fitted to the report's largest errors.
 
-The velocity is turned in the x-y plane of the earth-fixed frame, which is not horizontal, and the spoofed position is
-the sum of the turned velocities of whole seconds. This sum is a rectangle rule: where the vehicle itself turns it is
-off by half a second of the change of velocity, some 10 m in a turn of 60 degrees at 20 m/s. The package's own attacks
-``foi-1`` to ``foi-8`` keep that rule, but turn the velocity in the horizontal plane.
+The velocity is turned in the x-y plane of the earth-fixed frame, which is not horizontal, and keeps its length there.
+The printed formula has the length of the whole velocity in that plane; taken literally, it gives largest errors of 10
+to 500 m where the report has 5 to 369 m. The spoofed position is the sum of the turned velocities of whole seconds.
+This sum is a rectangle rule: where the vehicle itself turns it is off by half a second of the change of velocity, some
+10 m in a turn of 60 degrees at 20 m/s. The package's own attacks ``foi-1`` to ``foi-8`` keep that rule, but turn the
+velocity in the horizontal plane.
 """
 
 from __future__ import annotations
@@ -41,7 +43,7 @@ def earth_fixed_axes(latitude: float, longitude: float) -> Floats:
     )
 
 
-def printed_offsets(attack: Attacked, units: float = RADIANS, turn: float = 0.0) -> Floats:
+def fitted_offsets(attack: Attacked, units: float = RADIANS, turn: float = 0.0) -> Floats:
     """Spoofed minus true position at the seconds from the attack's start to just before its end, (n, 3), m ENU.
 
     Args:
@@ -68,7 +70,7 @@ def printed_offsets(attack: Attacked, units: float = RADIANS, turn: float = 0.0)
 
 def largest_offset(attack: Attacked, units: float, turn: float) -> float:
     """Largest distance between the spoofed and the true position, m."""
-    return float(np.linalg.norm(printed_offsets(attack, units, turn), axis=1).max())
+    return float(np.linalg.norm(fitted_offsets(attack, units, turn), axis=1).max())
 
 
 def largest_offset_in_game(number: int, scenario: Scenario) -> float:
@@ -80,8 +82,8 @@ def largest_offset_in_game(number: int, scenario: Scenario) -> float:
     return float(np.linalg.norm(offsets[0], axis=1).max())
 
 
-class PrintedAzimuth(Attack):
-    """The attack of one of the report's scenarios, as it is printed.
+class FittedAzimuth(Attack):
+    """The attack of one of the report's scenarios, by our reading.
 
     Args:
         attack: start, end, growth and largest value.
@@ -94,13 +96,13 @@ class PrintedAzimuth(Attack):
     @property
     def name(self) -> str:
         """What it is; no specification builds it."""
-        return f"printed azimuth attack of {self.attack.azimuth:g} degrees"
+        return f"fitted azimuth attack of {self.attack.azimuth:g} degrees"
 
     def bind(self, timeline: Timeline, num_runs: int) -> None:
         """Compute the offsets of the game, whose epochs are whole seconds."""
         super().bind(timeline, num_runs)
         self._offsets = np.zeros((timeline.num_epochs + 1, 3))
-        offsets = printed_offsets(self.attack)
+        offsets = fitted_offsets(self.attack)
         first = round(self.attack.start - timeline.start)
         self._offsets[first : first + len(offsets)] = offsets
 

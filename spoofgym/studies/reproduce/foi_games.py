@@ -19,7 +19,7 @@ from spoofgym.responses.base import Response
 from spoofgym.scenario import Scenario
 from spoofgym.scenarios import make_scenario
 from spoofgym.simulation import Simulation
-from spoofgym.studies.reproduce.foi_azimuth import PrintedAzimuth
+from spoofgym.studies.reproduce.foi_azimuth import FittedAzimuth
 from spoofgym.studies.reproduce.foi_tables import ATTACKS, Attacked, Setting
 from spoofgym.studies.reproduce.tracks import Tracks, play
 
@@ -33,11 +33,24 @@ NEVER_REACHED = 1e9
 EXPONENTS = (0.05, 4.0)
 
 
-def drive(process_noise: float) -> Scenario:
-    """The report's drive with its receiver and nine states, from 21 s on: the longest window is full there."""
+SCORED = 21
+"""From here on errors count, s: the longest window of test (3) is full."""
+STANDSTILL = 2
+"""Where games of test (1) begin, s: the vehicle stands, and its unaided INS starts with it (section 6.1)."""
+DRIVE_ENDS = 250
+
+
+def drive(process_noise: float, start: int = SCORED) -> Scenario:
+    """The report's drive with its receiver and nine states, from ``start`` on, s."""
     return make_scenario(
-        f"foi-drive:onset=21,horizon=229,receiver=foi,process_noise={process_noise:g},bias_states=false"
+        f"foi-drive:onset={start},horizon={DRIVE_ENDS - start},receiver=foi,process_noise={process_noise:g},"
+        "bias_states=false"
     )
+
+
+def scored(tracks: Tracks, values: Floats) -> Floats:
+    """The part of a series of each run, (N, K+1), in which errors count."""
+    return values[:, tracks.time >= SCORED]
 
 
 class Armed(Response):
@@ -87,7 +100,8 @@ class RelativeThreshold:
 def relative_threshold(window: int, seed: int) -> RelativeThreshold:
     """Slope and threshold of test (1) for a window of k samples (section 5.1), on runs of their own."""
     detector = RelativeMotion(window, slope=0.0, threshold=NEVER_REACHED)
-    tracks = play(Simulation(drive(PROCESS_NOISE), None, [detector], None, CLEAN_RUNS, CLEAN_SEED + seed))
+    scenario = drive(PROCESS_NOISE, STANDSTILL)
+    tracks = play(Simulation(scenario, None, [detector], None, CLEAN_RUNS, CLEAN_SEED + seed))
     full = slice(tracks.at(ARMED), None)
     elapsed, statistic = tracks.time[full] - tracks.time[0], tracks.statistics[detector.name][:, full]
     slope = float(np.polyfit(elapsed, statistic.mean(axis=0), 1)[0])
@@ -117,7 +131,7 @@ class Games:
 
     def undefended(self, scenario: int) -> Tracks:
         """Every fix is used."""
-        attack = PrintedAzimuth(ATTACKS[scenario])
+        attack = FittedAzimuth(ATTACKS[scenario])
         return play(Simulation(drive(PROCESS_NOISE), attack, [], None, self.runs, self.seed))
 
     def defended(
@@ -127,8 +141,8 @@ class Games:
         response = make_response("exclude" if not setting.depth else f"exclude-and-backtrack:{setting.depth}")
         return play(
             Simulation(
-                drive(process_noise),
-                PrintedAzimuth(ATTACKS[scenario]),
+                drive(process_noise, STANDSTILL if setting.test == 1 else SCORED),
+                FittedAzimuth(ATTACKS[scenario]),
                 [self._detector(setting, threshold)],
                 Armed(response),
                 self.runs,
@@ -168,7 +182,7 @@ def figures(tracks: Tracks, attack: Attacked) -> Figures:
     runs, epochs = np.arange(len(tracks.alarm)), tracks.time
     alarm = tracks.alarm & (epochs > attack.start)
     alarmed, first = alarm.any(axis=1), alarm.argmax(axis=1)
-    error = length(tracks.error)
+    error = scored(tracks, length(tracks.error))
     excluded = ~tracks.used & (epochs >= attack.end)
     # the last epoch without GNSS; 1 before the attack's end where there is none
     last = np.where(excluded, epochs, attack.end - 1.0).max(axis=1)

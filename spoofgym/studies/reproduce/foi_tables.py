@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from spoofgym.attacks.azimuth import FOI_SCENARIOS
-from spoofgym.studies.reproduce.rows import NEVER
+from spoofgym.studies.reproduce.verdict import NEVER
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,12 @@ from spoofgym.studies.reproduce.kujur_windows import P_FA, Windows, coasting, cu
 from spoofgym.studies.reproduce.rows import (
     Group,
     Listing,
-    Published,
     Row,
     number_row,
-    number_verdict,
-    rounded,
+    on,
     statement_row,
 )
+from spoofgym.studies.reproduce.verdict import Published, number_verdict, probability_verdict, rounded
 
 PAPER = "kujur-2024"
 TITLE = "Kujur et al. 2024, monitor of a spoofer's tracking error"
@@ -122,19 +121,25 @@ def false_alarms(clean: Game) -> Listing:
             f"An epoch has {measured} measurements, so that there are {measured} N degrees; with these {correct} games "
             "alarm.",
         ),
-        share_row(
-            f"CI, threshold of {measured} N degrees at P_FA {FREQUENT:g}: share of clean games that alarm",
-            rounded(FREQUENT, 0.0),
-            int(np.sum(cumulative > cpi_theory.ci_threshold(FREQUENT, HORIZON, measured))),
-            games,
-            "A P_FA that so many games can show.",
+        on(
+            "own formula",
+            share_row(
+                f"CI, threshold of {measured} N degrees at P_FA {FREQUENT:g}: share of clean games that alarm",
+                rounded(FREQUENT, 0.0),
+                int(np.sum(cumulative > cpi_theory.ci_threshold(FREQUENT, HORIZON, measured))),
+                games,
+                "A P_FA that so many games can show.",
+            ),
         ),
-        share_row(
-            f"CPI, threshold of Gamma(N/2, 2) at P_FA {FREQUENT:g}: share of clean games that alarm (eq 35)",
-            rounded(FREQUENT, 0.0),
-            int(np.sum(projected > cpi_theory.cpi_threshold(FREQUENT, HORIZON))),
-            games,
-            f"At P_FA 1e-5 {seldom} of {games} games alarm.",
+        on(
+            "own formula",
+            share_row(
+                f"CPI, threshold of Gamma(N/2, 2) at P_FA {FREQUENT:g}: share of clean games that alarm (eq 35)",
+                rounded(FREQUENT, 0.0),
+                int(np.sum(projected > cpi_theory.cpi_threshold(FREQUENT, HORIZON))),
+                games,
+                f"At P_FA 1e-5 {seldom} of {games} games alarm.",
+            ),
         ),
     ]
     return Listing("Section 2 and equation 35: false alarms after 180 s", tuple(rows))
@@ -178,7 +183,9 @@ def distributions(clean: Game, spoofed: Game, exact: Windows) -> Listing:
             "depends on N, as the paper says.",
         ),
     )
-    return Listing("Equations 19 to 45: distribution of the CPI after 180 s", rows)
+    first, *others = rows
+    listed = (first, *(on("own formula", row) for row in others))
+    return Listing("Equations 19 to 45: distribution of the CPI after 180 s", listed)
 
 
 def _resampled_deviation(values: Floats) -> Floats:
@@ -201,6 +208,7 @@ def figure_1(spoofed: Game) -> Listing:
         (low, high),
         "reproduced" if low > exact_interval(cumulative, games)[1] else "not reproduced",
         f"The CI, with {measured} N degrees, detects {cumulative / games:.3f} (exact: {1.0 - missed:.3f}).",
+        "words",
     )
     return Listing("Figure 1: CPI and CI", (row,))
 
@@ -226,8 +234,9 @@ def _three_way_row(replica: Replica, game: Game, exact: Windows, n: int) -> Row:
         formula,
         share,
         (low, high),
-        number_verdict(rounded(formula, 0.0), *decided),
+        probability_verdict(formula, *decided),
         f"Exact P_MD: {value:.3g}." + ("" if missed else " No game missed it: the exact value decides."),
+        "own formula",
     )
 
 
@@ -266,4 +275,4 @@ def separation(clean: Game) -> Listing:
         square,
         f"σ_ss is {sigma:.2f} m.",
     )
-    return Listing("Appendix E: solution separation", (row,))
+    return Listing("Appendix E: solution separation", (on("own formula", row),))

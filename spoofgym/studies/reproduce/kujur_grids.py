@@ -9,15 +9,12 @@ import numpy as np
 from spoofgym.studies.reproduce.kujur_games import GRADES, INTERVAL, NAVIGATION, Replica, flight
 from spoofgym.studies.reproduce.kujur_windows import P_MD_CPI, Windows, coasting, windows
 from spoofgym.studies.reproduce.rows import (
-    NEVER,
     Grid,
     Listing,
-    Published,
     Row,
-    Value,
-    number_verdict,
     statement_row,
 )
+from spoofgym.studies.reproduce.verdict import NEVER, Published, Value, Verdict, number_verdict, probability_verdict
 
 TIMES = (0.0, 10.0, 40.0)
 SIGMAS, QUICK_SIGMAS = (0.05, 0.1, 0.2, 0.5, 1.0), (0.1, 0.5)
@@ -29,10 +26,9 @@ HOUR_WINDOW = round(30.0 / INTERVAL)
 
 
 def compared(item: str, formula: float, exact: float) -> Row:
-    """A value of the paper's formula beside the exact one: equal in two digits, within a factor of two, or neither."""
-    half = 0.5 * 10.0 ** (np.floor(np.log10(formula)) - 1.0) if formula > 0.0 else 0.0
-    published = Published(float(f"{formula:.2g}"), formula - half, formula + half)
-    return Row(item, published.value, exact, None, number_verdict(published, exact, exact, exact), FEEDBACK)
+    """A probability by the paper's formula beside the exact one."""
+    verdict = probability_verdict(formula, exact, exact, exact)
+    return Row(item, float(f"{formula:.2g}"), exact, None, verdict, FEEDBACK, "own formula")
 
 
 def missed_detection(exact: Windows) -> Grid:
@@ -236,9 +232,13 @@ def _level_cell(replica: Replica, levels: tuple[float | None, ...]) -> Row:
 def _either(item: str, formula: Value, exact: Value, half: float) -> Row:
     """A number or "never" of the formula beside the exact one."""
     if isinstance(formula, str) or isinstance(exact, str):
-        return Row(item, formula, exact, None, "reproduced" if formula == exact else "not reproduced", FEEDBACK)
+        return Row(item, formula, exact, None, _same(formula, exact), FEEDBACK, "own formula")
     published = Published(formula, formula - half, formula + half)
-    return Row(item, formula, exact, None, number_verdict(published, exact, exact, exact), FEEDBACK)
+    return Row(item, formula, exact, None, number_verdict(published, exact, exact, exact), FEEDBACK, "own formula")
+
+
+def _same(formula: Value, exact: Value) -> Verdict:
+    return "reproduced" if formula == exact else "not reproduced"
 
 
 def _about_windows(
@@ -270,6 +270,6 @@ def _convergence(sigma: float, by_time: Sequence[float | None]) -> Row:
     paper = "converges at decimetres"
     if white is None or coloured is None:
         reason = "There is no window for τ = 40 s within 180 s, and so no protection level of both monitors."
-        return Row(item, paper, NEVER, None, "not reproduced", reason)
+        return Row(item, paper, NEVER, None, "not reproduced", reason, "words")
     words = f"{white:.1f} and {coloured:.1f} m; we ask for 10 %."
     return _statement(item, paper, coloured / white, abs(coloured / white - 1.0) < 0.1, words)

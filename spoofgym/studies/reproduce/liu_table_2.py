@@ -8,7 +8,19 @@ import numpy as np
 
 from spoofgym.arrays import Floats
 from spoofgym.sensors.imu import DEGREE_PER_HOUR, MICRO_G
-from spoofgym.studies.reproduce.rows import Grid, Published, Reasons, Row, number_row, rounded
+from spoofgym.studies.reproduce.rows import (
+    Grid,
+    Group,
+    Listing,
+    Reasons,
+    Row,
+    again,
+    each,
+    number_row,
+    on,
+    statement_row,
+)
+from spoofgym.studies.reproduce.verdict import Published, rounded
 
 HEADS = ("state", "E or R", "N or F", "U")
 
@@ -20,54 +32,72 @@ TABLE_2 = {
     "gyro bias, °/h": (((0.11, 1.59e-5), (0.18, 2.52e-5), (0.03, 7.72e-6)), (1e-7, 1e-7, 1e-8)),
     "acc. bias, µg": (((0.29, 6.33e-2), (0.35, 7.17e-2), (0.07, 1.14e-3)), (1e-4, 1e-4, 1e-5)),
 }
+SMALL = 0.5
+"""What counts as negligible, %: the largest printed change is 0.35 %."""
+TRAJECTORY: Reasons = {
+    "partly": "Another trajectory gives another number; within a factor of two.",
+    "not reproduced": "The flight before the attack is not printed, and the changes depend on it.",
+}
 UNITS = np.repeat([math.radians(1.0), 1.0, 1.0, DEGREE_PER_HOUR, MICRO_G], 3)
 
 
-def grids(spoofed: Floats, clean: Floats) -> tuple[Grid, Grid, Grid]:
+def grids(spoofed: Floats, clean: Floats) -> tuple[Grid, Listing, Grid, Group]:
     """All figures of the table, and the square roots of P that they imply.
 
     Args:
         spoofed: square root of the diagonal of P at 1100 s after 300 s of a 12.4 m/s ramp, (N, 15), SI.
         clean: the same runs without the ramp.
     """
-    return relative_change(spoofed, clean), absolute_change(spoofed, clean), deviation(clean)
+    return (
+        relative_change(spoofed, clean),
+        small_change(spoofed, clean),
+        absolute_change(spoofed, clean),
+        each(lambda row: on("calibrated", row), deviation(clean)),
+    )
 
 
 def relative_change(spoofed: Floats, clean: Floats) -> Grid:
     """Table 2, relative: change of sqrt(P) at 1100 s under 12.4 m/s (eq 46), %."""
     change = 100.0 * np.abs(spoofed / clean - 1.0)
-    below = bool((change < 0.5).all())
-    reasons: Reasons = {
-        "partly": "Another trajectory gives another number, but every change stays below half a percent."
-    }
     rows = [
-        number_row(f"relative change of sqrt(P), {state}, %", p, column, tendency=below, reasons=reasons)
+        number_row(f"relative change of sqrt(P), {state}, %", p, column, reasons=TRAJECTORY)
         for state, p, column in zip(_states(), _published_relative(), change.T, strict=True)
     ]
     largest = number_row(
-        "largest of the 15 relative changes, %",
-        rounded(0.35, 0.01),
-        change.max(axis=1),
-        tendency=below,
-        reasons=reasons,
+        "largest of the 15 relative changes, %", rounded(0.35, 0.01), change.max(axis=1), reasons=TRAJECTORY
     )
-    lines = (*_lines(rows), ("largest", (largest, None, None)))
+    lines = (*_lines(rows), ("largest", (again(largest), None, None)))
     return Grid("Table 2: relative change of √P after 300 s at 12.4 m/s, %", HEADS, lines)
+
+
+def small_change(spoofed: Floats, clean: Floats) -> Listing:
+    """What table 2 is printed for: an attack hardly changes the filter's P."""
+    largest = 100.0 * np.abs(spoofed / clean - 1.0).max(axis=1)
+    row = statement_row(
+        "largest of the 15 relative changes of √P, %",
+        "negligible",
+        largest < SMALL,
+        largest,
+        f"We ask for less than {SMALL:g} %: gains and P depend on the trajectory, which the spoofer hardly changes.",
+    )
+    return Listing("Table 2 in words", (row,))
 
 
 def absolute_change(spoofed: Floats, clean: Floats) -> Grid:
     """Table 2, absolute: change of sqrt(P) at 1100 s under 12.4 m/s (eq 45), in the units of the paper."""
     change = np.abs(spoofed - clean) / UNITS
-    reasons: Reasons = {"not reproduced": "The flight before the attack is not printed, and the changes depend on it."}
     rows = [
-        number_row(f"absolute change of sqrt(P), {state}", p, column, reasons=reasons)
+        number_row(f"absolute change of sqrt(P), {state}", p, column, reasons=TRAJECTORY)
         for state, p, column in zip(_states(), _published_absolute(), change.T, strict=True)
     ]
     return Grid("Table 2: absolute change of √P", HEADS, _lines(rows))
 
 
 def deviation(clean: Floats) -> Grid:
-    """The square roots of P that the two changes imply: their quotient, as uncertain as both are rounded."""
+    """The square roots of P that the two changes imply: their quotient, as uncertain as both are rounded.
+
+    The rate of the fixes was chosen by these figures.
+    """
     reasons: Reasons = {
         "partly": "Within a factor of two; the flight before the attack decides how well the state is observed.",
         "not reproduced": "The flight before the attack is not printed, and it decides how well the state is observed.",

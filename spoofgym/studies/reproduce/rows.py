@@ -1,21 +1,23 @@
-"""A published figure beside ours, and the rule that gives the verdict.
+"""A published figure beside ours, with its verdict and what it rests on.
 
-- **reproduced**: the published value, as it is rounded in print, meets the interval of ours: from the smallest to the
-  largest of our runs, or the 95 % interval of a share of them. A further run like ours would fall outside the range of
-  n of them with probability 2 / (n + 1).
-- **partly**: it does not, but it is within a factor of two of our median, or the tendency that the row names holds.
-- **not reproduced**: neither.
+The basis of a row says what it is evidence of:
 
-A statement in words is reproduced where it holds in every run, partly where it holds in more than half of them or the
-tendency that the row names holds in all. An
-event that some runs never see ("never") is reproduced where at least half of our runs agree with the paper on whether
-it happens, and a published time then meets the range of those that see it; partly where some runs agree.
+- **printed**: the paper prints the number.
+- **words**: the paper says it in words.
+- **own formula**: the paper prints no number; its formula is evaluated with our parameters.
+- **calibrated**: something of ours was chosen with this figure in sight, so that agreement is no evidence.
+- **by construction**: it could not come out differently.
+- **rejected reading**: another reading of the paper than the one that the other rows take.
+
+Only printed figures and words are counted, each once: a row that *repeats* a figure, with another set-up than the one
+that decides, is shown and not counted.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -24,35 +26,26 @@ from spoofgym.arrays import Flags, Floats
 from spoofgym.evaluation.metrics import NORMAL_95
 from spoofgym.evaluation.report import SCHEMA_VERSION
 from spoofgym.program import COMPLETE
+from spoofgym.studies.reproduce.verdict import (
+    NEVER,
+    Published,
+    Value,
+    Verdict,
+    event_verdict,
+    number_verdict,
+    statement_verdict,
+)
 
-Verdict = Literal["reproduced", "partly", "not reproduced"]
+Basis = Literal["printed", "words", "own formula", "calibrated", "by construction", "rejected reading"]
+COUNTED: tuple[Basis, ...] = ("printed", "words")
 Reasons = dict[Verdict, str]
-Value = float | str
-NEVER = "never"
 
-INSIDE = "The published value meets the range of our runs."
-NEAR = "Outside the range of our runs, but within a factor of two of their median."
-FAR = "Outside the range of our runs, and more than a factor of two from their median."
-
-
-@dataclass(frozen=True)
-class Published:
-    """A value as a paper prints it.
-
-    Attributes:
-        value: the number, a statement in words, or "never".
-        low: smallest number that is printed so.
-        high: largest; infinite for a value that is a lower limit.
-    """
-
-    value: Value
-    low: float = math.nan
-    high: float = math.nan
-
-
-def rounded(value: float, place: float = 1.0) -> Published:
-    """A number whose last significant digit has the place ``place``: rounding moved it by half of that at most."""
-    return Published(value, value - 0.5 * place, value + 0.5 * place)
+REASONS: Reasons = {
+    "reproduced": "The median is within 20 % of the published value, or within its rounding.",
+    "compatible": "The published value lies in the range of our runs, but the median is farther than 20 % from it.",
+    "partly": "Outside the range of our runs, but within a factor of two of their median.",
+    "not reproduced": "Outside the range of our runs, and more than a factor of two from their median.",
+}
 
 
 @dataclass(frozen=True)
@@ -64,8 +57,10 @@ class Row:
         paper_value: as printed.
         value: ours: a median over runs, a share, or "never"; None where nothing is compared.
         interval: of ours, from the smallest to the largest run or the 95 % interval of a share; None = there is none.
-        verdict: by the rule of this module.
+        verdict: by `spoofgym.studies.reproduce.verdict`.
         reason: of the verdict, a sentence.
+        basis: what the row is evidence of.
+        repeats: whether another row has the same published figure, with the set-up that decides.
     """
 
     item: str
@@ -74,6 +69,13 @@ class Row:
     interval: tuple[Value, Value] | None
     verdict: Verdict
     reason: str
+    basis: Basis = "printed"
+    repeats: bool = False
+
+    @property
+    def counted(self) -> bool:
+        """Whether the tally has it."""
+        return self.basis in COUNTED and not self.repeats
 
     def as_json(self) -> dict[str, Any]:
         """The row with plain types."""
@@ -85,34 +87,24 @@ class Row:
             "interval": interval,
             "verdict": self.verdict,
             "reason": self.reason,
+            "basis": self.basis,
+            "counted": self.counted,
         }
 
 
-def number_row(
-    item: str, published: Published, values: Floats, *, tendency: bool = False, reasons: Reasons | None = None
-) -> Row:
+def number_row(item: str, published: Published, values: Floats, *, reasons: Reasons | None = None) -> Row:
     """A published number beside one of each run.
 
     Args:
         item: what it is.
         published: the number, with its rounding.
         values: ours, (N,).
-        tendency: whether what the number stands for holds in our runs although the number may not.
         reasons: a sentence for a verdict, where there is a better one than the rule's.
     """
     low, median, high = float(np.min(values)), float(np.median(values)), float(np.max(values))
-    verdict = number_verdict(published, low, median, high, tendency)
-    reason = (reasons or {}).get(verdict) or {"reproduced": INSIDE, "partly": NEAR, "not reproduced": FAR}[verdict]
+    verdict = number_verdict(published, low, median, high)
+    reason = (reasons or {}).get(verdict) or REASONS[verdict]
     return Row(item, published.value, median, (low, high), verdict, reason)
-
-
-def number_verdict(published: Published, low: float, median: float, high: float, tendency: bool = False) -> Verdict:
-    """The rule for a number."""
-    if published.low <= high and published.high >= low:
-        return "reproduced"
-    nearest = min(max(median, published.low), published.high)
-    near = 0.5 * nearest <= median <= 2.0 * nearest if nearest > 0 else median == nearest
-    return "partly" if near or tendency else "not reproduced"
 
 
 def event_row(
@@ -124,42 +116,26 @@ def event_row(
         item: what it is.
         published: the time, with its rounding, or "never".
         times: ours.
-        origin: from which a factor of two counts.
+        origin: the onset, from which the verdict counts both.
         reasons: as for `number_row`.
     """
+    since = Published(published.value, published.low - origin, published.high - origin)
+    verdict = event_verdict(since, times - origin)
     seen = np.isfinite(times)
+    agreeing = int(np.sum(~seen if published.value == NEVER else seen))
+    agree = f"{agreeing} of {len(times)} runs agree with the paper on whether it happens"
     median = float(np.sort(times)[(len(times) - 1) // 2])
-    low, high = float(np.min(times)), float(np.max(times))
-    share = float(np.mean(~seen)) if published.value == NEVER else float(np.mean(seen))
-    if published.value == NEVER:
-        verdict: Verdict = "reproduced" if share >= 0.5 else "partly" if share > 0 else "not reproduced"
-    elif share == 0:
-        verdict = "not reproduced"
-    else:
-        since = Published(published.value, published.low - origin, published.high - origin)
-        found = times[seen] - origin
-        verdict = number_verdict(since, float(np.min(found)), float(np.median(found)), float(np.max(found)))
-        if share < 0.5 and verdict == "reproduced":
-            verdict = "partly"
-    agree = f"{round(share * len(times))} of {len(times)} runs agree with the paper on whether it happens"
+    ends = (_or_never(float(np.min(times))), _or_never(float(np.max(times))))
     reason = (reasons or {}).get(verdict)
-    return Row(
-        item,
-        published.value,
-        _or_never(median),
-        (_or_never(low), _or_never(high)),
-        verdict,
-        f"{reason.removesuffix('.')} ({agree})." if reason else f"{agree}.",
-    )
+    told = f"{reason.removesuffix('.')} ({agree})." if reason else f"{agree}."
+    return Row(item, published.value, _or_never(median), ends, verdict, told)
 
 
 def _or_never(time: float) -> Value:
     return time if math.isfinite(time) else NEVER
 
 
-def statement_row(
-    item: str, statement: str, holds: Flags, values: Floats, reason: str, *, tendency: Flags | None = None
-) -> Row:
+def statement_row(item: str, statement: str, holds: Flags, values: Floats, reason: str) -> Row:
     """A statement in words beside the number of each run that decides it.
 
     Args:
@@ -168,12 +144,19 @@ def statement_row(
         holds: in each run, (N,).
         values: what ``item`` names, in each run, (N,).
         reason: how we decide, and what we see.
-        tendency: whether what the statement stands for holds in each run, although the statement may not, (N,).
     """
-    share, near = float(np.mean(holds)), tendency is not None and bool(np.all(tendency))
-    verdict: Verdict = "reproduced" if share == 1.0 else "partly" if share > 0.5 or near else "not reproduced"
     interval = (float(np.min(values)), float(np.max(values)))
-    return Row(item, statement, float(np.median(values)), interval, verdict, reason)
+    return Row(item, statement, float(np.median(values)), interval, statement_verdict(holds), reason, "words")
+
+
+def on(basis: Basis, row: Row) -> Row:
+    """The row on another basis."""
+    return replace(row, basis=basis)
+
+
+def again(row: Row) -> Row:
+    """The row as one that repeats a published figure which another row decides."""
+    return replace(row, repeats=True)
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -225,6 +208,14 @@ class Grid:
 Group = Listing | Grid
 
 
+def each(change: Callable[[Row], Row], group: Group) -> Group:
+    """The group with every row changed."""
+    if isinstance(group, Listing):
+        return replace(group, rows=tuple(change(row) for row in group.rows))
+    lines = ((label, tuple(None if cell is None else change(cell) for cell in cells)) for label, cells in group.lines)
+    return replace(group, lines=tuple(lines))
+
+
 @dataclass(frozen=True)
 class Reproduction:
     """All rows of one paper.
@@ -253,6 +244,11 @@ class Reproduction:
     def rows(self) -> tuple[Row, ...]:
         """The rows of all groups."""
         return tuple(row for group in self.groups for row in group.rows)
+
+    def tally(self, basis: Basis) -> dict[Verdict, int]:
+        """How many published figures of a basis have each verdict, each figure once."""
+        verdicts = [row.verdict for row in self.rows if row.basis == basis and not row.repeats]
+        return {verdict: verdicts.count(verdict) for verdict in REASONS}
 
     def as_json(self) -> dict[str, Any]:
         """The rows with plain types, and what made them."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import get_args
 
 from rich.console import Group as RenderableGroup
 from rich.console import RenderableType
@@ -11,10 +12,16 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from spoofgym.studies.reproduce.rows import Grid, Listing, Reproduction, Row, Value
+from spoofgym.studies.reproduce.rows import COUNTED, Basis, Grid, Listing, Reproduction, Row
+from spoofgym.studies.reproduce.verdict import Value, Verdict
 
 WIDTH = 100
-MARKS = {"reproduced": ("✓", "green"), "partly": ("~", "yellow"), "not reproduced": ("✗", "red")}
+MARKS: dict[Verdict, tuple[str, str]] = {
+    "reproduced": ("✓", "green"),
+    "compatible": ("≈", "cyan"),
+    "partly": ("~", "yellow"),
+    "not reproduced": ("✗", "red"),
+}
 
 
 def reproduction_parts(report: Reproduction, columns: int) -> RenderableGroup:
@@ -34,7 +41,9 @@ def _parts(report: Reproduction) -> Iterator[RenderableType]:
     if report.quick:
         head.append("  quick: too few runs for a verdict that counts", style="bold red")
     yield head
-    yield Text("Ours: median [smallest–largest run].  ✓ reproduced   ~ partly   ✗ not reproduced")
+    marks = "   ".join(f"{mark} {verdict}" for verdict, (mark, _) in MARKS.items())
+    yield Text(f"Ours: median [smallest–largest run].  {marks}")
+    yield Text("In brackets: not counted, because it was calibrated, follows from a formula, or repeats another row.")
     for group in report.groups:
         yield ""
         yield Text(group.title, style="bold")
@@ -46,6 +55,7 @@ def _parts(report: Reproduction) -> Iterator[RenderableType]:
     for reading in report.readings:
         yield _bullet(reading)
     yield ""
+    yield Text("Published figures, each once", style="bold")
     yield tally(report)
 
 
@@ -56,13 +66,41 @@ def _bullet(text: str) -> Table:
     return table
 
 
-def tally(report: Reproduction) -> Text:
-    """How many rows have each verdict."""
-    line = Text()
+def tally(report: Reproduction) -> Table:
+    """How many published figures of each basis have each verdict; the first two lines count."""
+    table = _frame()
+    table.add_column("basis")
     for verdict, (mark, style) in MARKS.items():
-        count = sum(row.verdict == verdict for row in report.rows)
-        line.append(f"{mark} {verdict} {count}   ", style=style)
-    return line
+        table.add_column(f"{mark} {verdict}", justify="right", style=style)
+    for basis in get_args(Basis):
+        found = report.tally(basis)
+        if any(found.values()):
+            table.add_row(basis, *(str(found[verdict]) for verdict in MARKS))
+    return table
+
+
+def summary(reports: Sequence[Reproduction]) -> Table:
+    """A line per paper and counted basis: how many published figures have each verdict."""
+    table = _frame()
+    table.add_column("paper")
+    table.add_column("basis")
+    for verdict, (mark, style) in MARKS.items():
+        table.add_column(f"{mark} {verdict}", justify="right", style=style)
+    table.add_column("not counted", justify="right")
+    for report in reports:
+        for basis in COUNTED:
+            found = report.tally(basis)
+            rest = str(sum(not row.counted for row in report.rows)) if basis == COUNTED[0] else ""
+            table.add_row(
+                report.paper if basis == COUNTED[0] else "", basis, *(str(found[verdict]) for verdict in MARKS), rest
+            )
+    return table
+
+
+def _mark(row: Row) -> Text:
+    """The mark of the verdict, in brackets where it does not count."""
+    mark, style = MARKS[row.verdict]
+    return Text(mark if row.counted else f"({mark})", style=style)
 
 
 def number(value: Value | None, digits: int = 3) -> str:
@@ -98,10 +136,10 @@ def _listing(group: Listing) -> Table:
     table.add_column("paper", justify="right", max_width=20)
     table.add_column("ours", justify="right", overflow="fold")
     for row in group.rows:
-        mark, style = MARKS[row.verdict]
         item = Text(row.item)
-        item.append(f"\n{row.reason}", style="dim")
-        table.add_row(Text(mark, style=style), item, number(row.paper_value), _ours(row))
+        why = "" if row.basis in COUNTED else f" [{row.basis}]"
+        item.append(f"\n{row.reason}{why}", style="dim")
+        table.add_row(_mark(row), item, number(row.paper_value), _ours(row))
     return table
 
 
@@ -118,7 +156,6 @@ def _grid(group: Grid) -> Table:
 def _cell(row: Row | None) -> Text:
     if row is None:
         return Text("")
-    mark, style = MARKS[row.verdict]
     cell = Text(f"{_ours(row)}\npaper {number(row.paper_value)} ", justify="right")
-    cell.append(mark, style=style)
+    cell.append_text(_mark(row))
     return cell
