@@ -30,9 +30,9 @@ class SolutionSeparation(ThresholdDetector):
     filter runs. The innovations projected onto the position are the same test.
 
     One window only: an attack that is longer than n epochs contaminates the solution it is compared with. Kujur's bank
-    of windows, one opened at every epoch, is `separation-bank`, on ranges. The map is that of a filter that uses every fix, computed once
-    along the scenario's linear model; fixes that have not come, or that the receiver does not give, count as zero.
-    Epochs before epoch 0 are as epoch 0.
+    of windows, one opened at every epoch, is `separation-bank`, on ranges. The map is that of a filter that uses every
+    fix, computed once along the scenario's linear model; fixes that have not come, or that the receiver does not give,
+    count as zero. Epochs before epoch 0 are as epoch 0.
 
     Kujur (2024) projects onto the vertical and sums over windows; the horizontal form is ours.
 
