@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from spoofgym.detectors import make_detector
+from spoofgym.navigation.interface import Epoch, Innovation
 from spoofgym.studies.reproduce import shadmehri_2025
 from spoofgym.studies.reproduce.papers import reproduce
 from spoofgym.studies.reproduce.shadmehri_2025 import COMMON, SELF_TUNING, Flights, Setup, fly, statistic
@@ -56,6 +58,24 @@ def test_self_tuning_filter_is_blind_in_white_noise_at_a_matched_rate():
     assert stats.binomtest(only_common, only_common + only_tuned, 0.5, alternative="greater").pvalue < 1e-3
 
 
+def test_a_moving_sum_has_as_many_terms_as_there_are():
+    found = shadmehri_2025.moving_sum(np.array([[1.0, 2.0, 4.0, 8.0]]), 3)
+    np.testing.assert_array_equal(found, [[1.0, 3.0, 7.0, 14.0]])
+
+
+def test_the_sum_of_statistics_is_what_the_windowed_detector_alarms_on():
+    """The detector on a flight of its own, against the sums of the statistic that the rows take."""
+    _, nis = statistic(Setup(COMMON, "markov", 10), 5.0, 3, 0)
+    detector = make_detector("windowed:n=4,threshold=25.9")
+    detector.bind(3, 3)
+    detector.reset(np.arange(3))
+    own = []
+    for values in nis.T:
+        innovation = Innovation(np.zeros((3, 3)), np.zeros((3, 3, 3)), np.zeros((3, 3)), values)
+        own.append(detector.update(Epoch(np.zeros(3, dtype=np.int64), np.zeros(3), innovation)))
+    np.testing.assert_allclose(np.array(own).T, shadmehri_2025.moving_sum(nis, 4), rtol=1e-12)
+
+
 @pytest.mark.parametrize("noise", ["white", "markov"])
 def test_the_self_tuning_filter_flies_at_160_hz(noise):
     times, nis = statistic(Setup(SELF_TUNING, noise, 160), 2.0, 2, 0)
@@ -82,7 +102,7 @@ def test_rows_have_every_setup_and_figures_of_the_paper():
     report = reproduce(shadmehri_2025.PAPER, 3, 0, quick=True)
     assert report.paper == "shadmehri-2025"
     titles = [group.title for group in report.groups]
-    assert len(titles) == len(set(titles)) == 8
+    assert len(titles) == len(set(titles)) == 9
     named = [(row["group"], row["item"]) for row in report.as_json()["rows"]]
     assert len(set(named)) == len(named), "a row is told by its group and its item"
     printed = [row.paper_value for group in report.groups[:4] for row in group.rows]

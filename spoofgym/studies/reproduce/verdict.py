@@ -75,10 +75,10 @@ def number_verdict(published: Published, low: float, median: float, high: float)
 
 def probability_verdict(published: float, low: float, median: float, high: float) -> Verdict:
     """The rule for a probability of which the order of magnitude counts; arguments as `number_verdict`."""
-    if published <= 0.0 or median <= 0.0:
-        return "reproduced" if published == median else "not reproduced"
-    decades = abs(math.log10(median / published))
     inside = low <= published <= high
+    if published <= 0.0 or median <= 0.0:
+        return "reproduced" if published == median else "compatible" if inside else "not reproduced"
+    decades = abs(math.log10(median / published))
     if decades <= DECADES and (inside or low <= 0.0 or math.log10(high / low) < DECADES):
         return "reproduced"
     if inside:
