@@ -30,7 +30,7 @@ NOT_NUMERICAL = (
     *("envs/test_rendering.py", "envs/test_sb3.py", "envs/test_spoofer_figure.py", "envs/test_tight_pages.py"),
     *("envs/test_trained.py", "envs/test_window.py"),
     *("navigation/test_fidelities.py", "navigation/test_guided_motion.py"),
-    *("attacks", "responses", "detectors/test_aid_innovation.py", "detectors/test_needs.py"),
+    *("attacks", "responses", "detectors/test_needs.py"),
     *("envs/test_bank_features.py", "envs/test_defender_vector.py"),
     *("navigation/aids/test_aided_filter.py", "navigation/aids/test_aided_ranges.py"),
 )
@@ -39,6 +39,7 @@ disk; scenarios, logs, attacks and responses, whose parts or golden episodes are
 move: shares and means of simulated games, a posterior that a grid approximates, and filters with aids, whose golden
 episodes are played. All else is numerical, what is added included."""
 NOT_NUMERICAL_EITHER = (
+    "detectors/test_aid_innovation.py::test_both_fidelities_show_the_same_test",
     "detectors/test_relative_motion.py::test_what_the_filter_does_with_the_fixes_does_not_matter",
     "detectors/test_separation_windows.py::test_twenty_minutes_after_their_common_origin",
     "detectors/test_acceleration.py::test_the_spread_in_clean_games_is_that_of_the_receiver",

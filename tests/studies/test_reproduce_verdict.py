@@ -32,11 +32,15 @@ AT_LEAST = Published("> 0.3", 0.3, math.inf)
         (rounded(100), (40.0, 49.0, 60.0), "not reproduced"),
         (rounded(100), (40.0, 50.5, 60.0), "partly"),
         (rounded(5), (4.6, 4.6, 4.6), "reproduced"),  # printed as 5
-        (rounded(1, 1.0), (0.45, 0.45, 0.45), "reproduced"),  # within 20 % of 0.5, which is printed as 1
+        (rounded(1), (0.5, 0.5, 0.5), "reproduced"),  # printed as 1
+        (rounded(1), (0.2, 0.45, 0.6), "compatible"),  # rounding and 20 % do not add up
+        (rounded(1), (0.45, 0.45, 0.45), "not reproduced"),
         (rounded(0.0, 0.0), (0.0, 0.0, 0.0), "reproduced"),
         (rounded(0.0, 0.0), (0.0, 0.1, 0.2), "compatible"),
         (rounded(0.0, 0.0), (0.1, 0.1, 0.2), "not reproduced"),
         (rounded(-4.0, 1.0), (-4.2, -4.1, -4.0), "reproduced"),
+        (rounded(-4.0, 1.0), (-7.9, -7.9, -7.9), "partly"),
+        (rounded(-4.0, 1.0), (4.0, 4.0, 4.0), "not reproduced"),
         (AT_LEAST, (0.2, 0.25, 0.31), "reproduced"),
         (AT_LEAST, (0.2, 0.23, 0.31), "compatible"),
         (AT_LEAST, (0.1, 0.151, 0.2), "partly"),

@@ -61,16 +61,24 @@ def number_verdict(published: Published, low: float, median: float, high: float)
         median: of our runs.
         high: largest.
     """
-    nearest = min(max(median, published.low), published.high)
-    tolerance = TOLERANCE * abs(nearest)
-    near = abs(median - nearest) <= tolerance
+    centre = _centre(published, median)
+    tolerance = TOLERANCE * abs(centre)
+    printed = published.low <= median <= published.high
+    near = printed or abs(median - centre) <= tolerance
     inside = published.low <= high and published.high >= low
     if near and (inside or high - low < tolerance):
         return "reproduced"
     if inside:
         return "compatible"
-    within = nearest / FACTOR <= median <= FACTOR * nearest if nearest > 0 else median == nearest
-    return "partly" if within else "not reproduced"
+    ratio = median / centre if centre else math.nan
+    return "partly" if 1.0 / FACTOR <= ratio <= FACTOR else "not reproduced"
+
+
+def _centre(published: Published, median: float) -> float:
+    """What the paper prints; of a limit the nearest number that it allows."""
+    if isinstance(published.value, str):
+        return min(max(median, published.low), published.high)
+    return published.value
 
 
 def probability_verdict(published: float, low: float, median: float, high: float) -> Verdict:
