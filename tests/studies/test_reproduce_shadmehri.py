@@ -107,5 +107,7 @@ def test_rows_have_every_setup_and_figures_of_the_paper():
     assert len(set(named)) == len(named), "a row is told by its group and its item"
     printed = [row.paper_value for group in report.groups[:4] for row in group.rows]
     assert printed == ["never", 3.41, 1.91, 0.35, 0.22, 0.11] * 4
+    costs = [row for row in report.rows if "share of clean runs that alarm within 5 s" in row.item]
+    assert [row.paper_value for row in costs] == [5e-4] * 4, "1e-5 in each of 50 epochs"
     assert sum("false alarms per epoch" in row.item for row in report.rows) == len(shadmehri_2025.SETUPS)
     assert all(0.0 <= row.value <= 1.0 for row in report.groups[-1].rows)

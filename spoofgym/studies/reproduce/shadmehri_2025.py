@@ -201,7 +201,8 @@ def sums(runs: int, seed: int) -> Listing:
                 latency = _latency(spoofed[ramp], terms, times, window)
                 rows.append(event_row(f"{name}, {ramp:g} m/s: detected after, s", value, latency))
             alarmed = int((moving_sum(clean, terms)[:, before] > SHADMEHRI_THRESHOLD).any(axis=1).sum())
-            rows.append(_cost(f"{name}: share of clean runs that alarm within 5 s", alarmed, CLEAN_RUNS * runs))
+            title = f"{name}: share of clean runs that alarm within 5 s"
+            rows.append(_cost(title, alarmed, CLEAN_RUNS * runs, int(before.sum())))
         mean = _latency(spoofed[5.0] / SUMMED[-1], SUMMED[-1], times, window)
         printed = event_row(
             f"mean of {SUMMED[-1]} as eq 14 prints it, {setup.filter}, 5 m/s: detected after, s",
@@ -230,11 +231,14 @@ def _latency(values: Floats, terms: int, times: Floats, window: Flags) -> Floats
     return np.where(above.any(axis=1), (times[window] - ONSET)[above.argmax(axis=1)], math.inf)
 
 
-def _cost(item: str, alarmed: int, runs: int) -> Row:
+def _cost(item: str, alarmed: int, runs: int, epochs: int) -> Row:
+    """Runs with an alarm in some epochs beside the share that `NOMINAL` per independent epoch would give."""
+    nominal = float(f"{1.0 - (1.0 - NOMINAL) ** epochs:.2g}")
     low, high = wilson_interval(alarmed, runs)
     share = alarmed / runs
-    verdict = probability_verdict(NOMINAL, low, share, high)
-    return Row(item, NOMINAL, share, (low, high), verdict, "What the reading costs in false alarms.", "own formula")
+    verdict = probability_verdict(nominal, low, share, high)
+    reason = f"{NOMINAL:g} per epoch, were the {epochs} epochs independent, against {alarmed} of {runs} runs."
+    return Row(item, nominal, share, (low, high), verdict, reason, "own formula")
 
 
 def false_alarms(flights: dict[Setup, Flights]) -> Listing:
