@@ -57,6 +57,9 @@ def test_an_event_shows_its_times_and_is_judged_from_its_onset():
     row = rows.event_row("x", rounded(131), np.array([160.0, 161.0, math.inf]))
     assert (row.value, row.interval, row.verdict) == (161.0, (160.0, NEVER), "partly")
     assert rows.event_row("x", rounded(131), np.array([160.0, 161.0]), origin=125.0).verdict == "not reproduced"
+    for late, verdict in ((21.0, "reproduced"), (30.0, "partly"), (45.0, "not reproduced")):
+        late_row = rows.event_row("x", rounded(117), 95.0 + np.array([late, late]), origin=95.0)
+        assert late_row.verdict == verdict, "22 s after the onset"
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 40), (1, 40), (29, 40), (40, 40)])

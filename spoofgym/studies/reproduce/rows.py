@@ -119,8 +119,7 @@ def event_row(
         origin: the onset, from which the verdict counts both.
         reasons: as for `number_row`.
     """
-    since = Published(published.value, published.low - origin, published.high - origin)
-    verdict = event_verdict(since, times - origin)
+    verdict = event_verdict(_since(published, origin), times - origin)
     seen = np.isfinite(times)
     agreeing = int(np.sum(~seen if published.value == NEVER else seen))
     agree = f"{agreeing} of {len(times)} runs agree with the paper on whether it happens"
@@ -129,6 +128,12 @@ def event_row(
     reason = (reasons or {}).get(verdict)
     told = f"{reason.removesuffix('.')} ({agree})." if reason else f"{agree}."
     return Row(item, published.value, _or_never(median), ends, verdict, told)
+
+
+def _since(published: Published, origin: float) -> Published:
+    """A published time, counted from the onset; "never" and limits in words keep their name."""
+    value = published.value if isinstance(published.value, str) else published.value - origin
+    return Published(value, published.low - origin, published.high - origin)
 
 
 def _or_never(time: float) -> Value:
