@@ -72,6 +72,9 @@ def test_the_jump_test_alone_is_an_epoch_later_than_both(drives):
 def test_rows_have_every_figure_of_tables_3_to_7(drives, monkeypatch):
     monkeypatch.setattr(song_2021, "drive", lambda runs, seed: drives)
     report = reproduce(song_2021.PAPER, RUNS, 0, quick=True)
+    basis = {row.item: row.basis for row in report.rows}
+    assert basis["Table 4, slow change (Ψ̃3): EKF, set-a, max, m"] == "calibrated", "the filter's lag was set from it"
+    assert basis["Table 4, slow change (Ψ̃3): EKF, set-a, σ, m"] == "printed"
     assert report.paper == "song-2021"
     printed = [row.paper_value for row in report.rows]
     for _, lines in TABLES.values():
